@@ -4,6 +4,7 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use crate::convert;
+use crate::physical_device::limits;
 use crate::resource::image::ImageView;
 use ash::vk;
 use simdevice::state::ResolveMode;
@@ -34,7 +35,7 @@ pub(crate) struct AttachmentDescription {
 }
 
 /// A subpass: indices of attachments.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Subpass {
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<usize>>,
@@ -48,6 +49,25 @@ pub(crate) struct Subpass {
     pub(crate) input: Vec<Option<usize>>,
     /// The views that draws render to, a bit each; 0 in a pass without views.
     pub(crate) view_mask: u32,
+    /// The samples with which attachments of one sample are rendered to, if there are several.
+    pub(crate) samples: Option<u32>,
+    /// The combinations of these samples for depth and for stencil.
+    pub(crate) own_modes: [ResolveMode; 2],
+}
+
+impl Default for Subpass {
+    fn default() -> Self {
+        Self {
+            color: Vec::new(),
+            resolve: Vec::new(),
+            depth_stencil: None,
+            depth_stencil_resolve: None,
+            input: Vec::new(),
+            view_mask: 0,
+            samples: None,
+            own_modes: [ResolveMode::SampleZero; 2],
+        }
+    }
 }
 
 /// The resolve of a subpass's depth and stencil attachment.
@@ -203,7 +223,7 @@ macro_rules! subpass {
             depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
             depth_stencil_resolve: None,
             input: input.iter().map(|r| used(r.attachment)).collect(),
-            view_mask: 0,
+            ..Subpass::default()
         }
     }};
 }
@@ -227,6 +247,21 @@ macro_rules! render_pass {
         }
         RenderPass::new(attachments.collect(), subpasses).map(Arc::new)
     }};
+}
+
+/// The samples with which attachments of one sample are rendered to, if there are several.
+///
+/// # Errors
+/// [`Error::FeatureNotPresent`] for a number of samples that attachments don't have.
+pub(crate) fn samples(info: &vk::MultisampledRenderToSingleSampledInfoEXT<'_>) -> Result<Option<u32>, Error> {
+    let count = info.rasterization_samples;
+    if info.multisampled_render_to_single_sampled_enable == vk::FALSE || count == vk::SampleCountFlags::TYPE_1 {
+        return Ok(None);
+    }
+    if !limits::SAMPLE_COUNTS.contains(count) || count.is_empty() {
+        return Err(Error::FeatureNotPresent(format!("rendering with samples {count:?}")));
+    }
+    Ok(Some(count.as_raw()))
 }
 
 /// The resolve of a subpass's depth and stencil, if it has one.
@@ -278,11 +313,24 @@ pub(crate) unsafe fn create_render_pass2(
     // SAFETY: the caller's promise.
     unsafe {
         let subpass = |description: &vk::SubpassDescription2<'_>| {
-            let resolve = match valid::find_in_chain(description.p_next) {
-                Some(info) => new_depth_stencil_resolve(info)?,
-                None => None,
-            };
+            let mut own_modes = Subpass::default().own_modes;
+            let resolve =
+                match valid::find_in_chain::<vk::SubpassDescriptionDepthStencilResolve<'_>>(description.p_next) {
+                    Some(info) => {
+                        for (own, mode) in
+                            own_modes.iter_mut().zip([info.depth_resolve_mode, info.stencil_resolve_mode])
+                        {
+                            *own = convert::resolve_mode(mode)?.unwrap_or(*own);
+                        }
+                        new_depth_stencil_resolve(info)?
+                    }
+                    None => None,
+                };
+            let multisampled =
+                valid::find_in_chain::<vk::MultisampledRenderToSingleSampledInfoEXT<'_>>(description.p_next);
             Ok::<_, Error>(Subpass {
+                samples: multisampled.map(samples).transpose()?.flatten(),
+                own_modes,
                 depth_stencil_resolve: resolve,
                 view_mask: description.view_mask,
                 ..subpass!(description)

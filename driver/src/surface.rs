@@ -268,6 +268,11 @@ pub(crate) fn get_physical_device_surface_capabilities2(
     mut surface_capabilities: OutputChain<'_, vk::SurfaceCapabilities2KHR<'_>>,
 ) -> Result<(), Error> {
     surface_capabilities.surface_capabilities = surface.capabilities()?;
+    surface_capabilities.for_each_chained(|mut chained| {
+        if let Some(protected) = chained.cast::<vk::SurfaceProtectedCapabilitiesKHR<'_>>() {
+            protected.supports_protected = vk::FALSE;
+        }
+    });
     Ok(())
 }
 

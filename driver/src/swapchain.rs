@@ -12,7 +12,7 @@ use crate::command::submit::{Batch, enqueue};
 use crate::device::Device;
 use crate::device_sync::{DeviceSync, WaitResult, deadline};
 use crate::queue::Queue;
-use crate::resource::image::{Image, bind_image_memory, new_image};
+use crate::resource::image::{Image, bind_image_memory, check_instances, new_image};
 use crate::resource::memory::Memory;
 use crate::surface::Surface;
 use crate::sync::{Fence, Semaphore};
@@ -443,6 +443,14 @@ pub(crate) unsafe fn bind_image_memory2(bind_infos: &[vk::BindImageMemoryInfo<'_
             let plane = valid::find_in_chain::<vk::BindImagePlaneMemoryInfo<'_>>(info.p_next);
             (handle::get(info.image)?, of_swapchain, plane)
         };
+        // SAFETY: the caller's promise.
+        unsafe {
+            if let Some(group) = valid::find_in_chain::<vk::BindImageMemoryDeviceGroupInfo<'_>>(info.p_next) {
+                let devices = valid::slice(group.p_device_indices, group.device_index_count)?;
+                let count = group.split_instance_bind_region_count;
+                check_instances(image, devices, valid::slice(group.p_split_instance_bind_regions, count)?)?;
+            }
+        }
         if let Some(info) = of_swapchain {
             // SAFETY: the caller's promise.
             let swapchain = unsafe { handle::get_optional(info.swapchain)? };

@@ -97,11 +97,12 @@ impl Pass {
             attachment.as_ref().map(|attachment| bind(attachment, aspect, rendering.layer_count)).transpose()
         };
         let resolve = |attachment: &Option<Attachment>, aspect| {
-            attachment
-                .as_ref()
-                .and_then(|attachment| Some((attachment, attachment.resolve.as_ref()?)))
-                .map(|(attachment, resolve)| bind_resolve(attachment, resolve, aspect, rendering))
-                .transpose()
+            let Some(attachment) = attachment else { return Ok(None) };
+            match (attachment.multisampled, &attachment.resolve) {
+                (Some(multisampled), _) => bind_own(attachment, multisampled.mode, aspect, rendering),
+                (None, Some(resolve)) => bind_resolve(attachment, resolve, aspect, rendering).map(Some),
+                (None, None) => Ok(None),
+            }
         };
         let mut pass = Self {
             area: rendering.area,
@@ -249,6 +250,7 @@ impl Pass {
         // The memory of the attachments now holds the cleared and drawn pixels, so that nothing is cleared again.
         for target in self.targets_mut() {
             target.clear = None;
+            target.initial = None;
         }
         self.draws.clear();
         self.bin_bytes = 0;
@@ -338,10 +340,32 @@ fn bind_resolve(
     Ok(Resolve { target, mode: resolve.mode })
 }
 
+/// Prepares the resolve of an attachment with several samples during the pass alone to its own view, if that is stored.
+fn bind_own(
+    attachment: &Attachment,
+    mode: ResolveMode,
+    aspect: Aspect,
+    rendering: &Rendering,
+) -> Result<Option<Resolve>, AttachmentError> {
+    if attachment.store != StoreOp::Store {
+        return Ok(None);
+    }
+    let target = Target::new(&attachment.view, aspect, rendering.layer_count, StoreOp::Store)?;
+    Ok(Some(Resolve { target, mode }))
+}
+
 /// Prepares an attachment's aspect.
 fn bind(attachment: &Attachment, aspect: Aspect, layer_count: u32) -> Result<Target, AttachmentError> {
     let view = &attachment.view;
     let mut target = Target::new(view, aspect, layer_count, attachment.store)?;
+    if let Some(multisampled) = attachment.multisampled {
+        let single = target;
+        if single.samples() != 1 {
+            return Err(AttachmentError::Samples(single.samples()));
+        }
+        target = single.with_samples(multisampled.samples)?;
+        target.initial = (attachment.load == LoadOp::Load).then(|| Box::new(single));
+    }
     target.clear = match attachment.load {
         LoadOp::Load | LoadOp::DontCare => None,
         LoadOp::Clear(value) => Some(view.format.encode_clear(aspect, value)),

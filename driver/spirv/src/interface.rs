@@ -393,6 +393,8 @@ pub struct Interface {
     pub workgroup_size: [u32; 3],
     /// Fragment: true if depth and stencil are tested before the shader.
     pub early_fragment_tests: bool,
+    /// Fragment: true if the sample mask that it reads is that after early tests.
+    pub post_depth_coverage: bool,
     /// Fragment: the promise about the depth that it writes.
     pub depth: DepthMode,
     /// Fragment: true if it may kill or demote.

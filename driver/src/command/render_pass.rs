@@ -8,6 +8,7 @@ use crate::abi::error::Error;
 use crate::abi::handle;
 use crate::abi::valid;
 use crate::convert::{self, rect};
+use crate::render_pass;
 use ash::vk;
 use simdevice::Packet;
 use simdevice::state::Rect;
@@ -77,7 +78,16 @@ unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRende
             Some(info) => attachment(info),
             None => Ok(None),
         };
+        let chained = valid::find_in_chain::<vk::MultisampledRenderToSingleSampledInfoEXT<'_>>(info.p_next);
+        let samples = chained.map(render_pass::samples).transpose()?.flatten();
+        let is_in_parts = vk::RenderingFlags::SUSPENDING | vk::RenderingFlags::RESUMING;
+        if samples.is_some() && info.flags.intersects(is_in_parts) {
+            return Err(Error::FeatureNotPresent(
+                "rendering with several samples to attachments of one, suspended or resumed".into(),
+            ));
+        }
         Ok(DynamicRendering {
+            samples,
             flags: info.flags,
             area: info.render_area,
             layers: info.layer_count,
@@ -108,6 +118,7 @@ unsafe fn attachment(info: &vk::RenderingAttachmentInfo<'_>) -> Result<Option<Dy
         load: info.load_op,
         store: info.store_op,
         clear_value: info.clear_value,
+        mode,
         resolve: resolve_view.zip(mode).map(|(view, mode)| ResolveTo { target: Arc::clone(view), mode }),
     }))
 }

@@ -6,11 +6,11 @@ mod tests;
 
 use crate::abi::error::Error;
 use crate::convert::{clear_value, rect};
-use crate::render_pass::{AttachmentDescription, RenderPass, layers};
+use crate::render_pass::{AttachmentDescription, RenderPass, Subpass, layers};
 use crate::resource::image::ImageView;
 use ash::vk;
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::packet::{Attachment, AttachmentResolve, LoadOp, Rendering, StoreOp};
+use simdevice::packet::{Attachment, AttachmentResolve, LoadOp, Multisampled, Rendering, StoreOp};
 use simdevice::state::{Rect, ResolveMode};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
@@ -87,7 +87,10 @@ fn check_resolve(attachment: &ImageView, view: &ImageView) -> Result<(), Error> 
 fn begin(rendering: Rendering) -> Result<Packet, Error> {
     let single = [&rendering.depth, &rendering.stencil];
     let attachments = rendering.color.iter().chain(single).flatten();
-    let samples = attachments.map(|attachment| attachment.view.image.desc.samples);
+    let samples = attachments.map(|attachment| match attachment.multisampled {
+        Some(multisampled) => multisampled.samples,
+        None => attachment.view.image.desc.samples,
+    });
     let samples: Vec<_> = samples.collect();
     if let Some(pair) = samples.windows(2).find(|pair| pair[0] != pair[1]) {
         return Err(Error::usage(
@@ -96,6 +99,12 @@ fn begin(rendering: Rendering) -> Result<Packet, Error> {
         ));
     }
     Ok(Packet::BeginRendering(Box::new(rendering)))
+}
+
+/// The samples with which a view is rendered to in a pass that renders with `samples` to attachments of one sample.
+fn multisampled(view: &ImageView, samples: Option<u32>, mode: ResolveMode) -> Option<Multisampled> {
+    let samples = samples.filter(|_| view.view.image.desc.samples == 1)?;
+    Some(Multisampled { samples, mode })
 }
 
 /// A render pass that has begun, with its attachments.
@@ -242,7 +251,14 @@ impl RenderPassInstance {
         });
         let (load_op, store_op) = ops(&self.render_pass.attachments[number]);
         let clear = || self.clear_value(view, number);
+        let Subpass { samples, own_modes, .. } = self.render_pass.subpasses[subpass];
+        let mode = match aspect {
+            Aspect::Color => ResolveMode::Average,
+            Aspect::Depth => own_modes[0],
+            Aspect::Stencil => own_modes[1],
+        };
         Ok(Attachment {
+            multisampled: multisampled(view, samples, mode),
             view: view.view.clone(),
             load: if self.render_pass.is_first_use(subpass, number) { load(load_op, clear)? } else { LoadOp::Load },
             store: if self.render_pass.is_last_use(subpass, number) { store(store_op)? } else { StoreOp::Store },
@@ -283,6 +299,8 @@ pub(crate) struct DynamicAttachment {
     pub(crate) clear_value: vk::ClearValue,
     /// The resolve at the end, to a view.
     pub(crate) resolve: Option<ResolveTo<Arc<ImageView>>>,
+    /// The combination of samples, if it is given.
+    pub(crate) mode: Option<ResolveMode>,
 }
 
 /// Dynamic rendering.
@@ -296,6 +314,8 @@ pub(crate) struct DynamicRendering {
     pub(crate) layers: u32,
     /// The views that draws render to, a bit each; 0 without views.
     pub(crate) view_mask: u32,
+    /// The samples with which attachments of one sample are rendered to, if there are several.
+    pub(crate) samples: Option<u32>,
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<DynamicAttachment>>,
     /// The depth attachment.
@@ -337,7 +357,9 @@ impl DynamicRendering {
             Ok::<_, Error>(AttachmentResolve { view: target.view.clone(), mode: *mode })
         });
         let format = attachment.view.view.format;
+        let usual = if aspect == Aspect::Color { ResolveMode::Average } else { ResolveMode::SampleZero };
         Ok(Attachment {
+            multisampled: multisampled(&attachment.view, self.samples, attachment.mode.unwrap_or(usual)),
             view: attachment.view.view.clone(),
             load: if self.flags.contains(vk::RenderingFlags::RESUMING) {
                 LoadOp::Load

@@ -117,13 +117,27 @@ fn is_atomic(format: Format) -> bool {
     is_one_word && (format.is_integer() || format.numeric() == Numeric::Sfloat)
 }
 
-/// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware;
-/// neither can a shared exponent, nor those of ten or twelve bits in words of sixteen.
+/// Reports whether a colour format can be rendered to. Formats of three components of 8 or 16 bits can't, as on other
+/// hardware; neither can a shared exponent, nor those of ten or twelve bits in words of sixteen.
 fn is_rendered(format: Format) -> bool {
-    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two() && !format.has(Channel::X)
+    let size = format.texel_size();
+    format.numeric() != Numeric::SharedExponent && !format.has(Channel::X) && (size.is_power_of_two() || size == 12)
 }
 
-/// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB and shared exponents.
+/// The number of components of a format whose components have 64 bits, which is for vertex attributes alone; 0 for other
+/// formats.
+pub(crate) fn wide_components(format: vk::Format) -> u32 {
+    use vk::Format as F;
+    match format {
+        F::R64_UINT | F::R64_SINT | F::R64_SFLOAT => 1,
+        F::R64G64_UINT | F::R64G64_SINT | F::R64G64_SFLOAT => 2,
+        F::R64G64B64_UINT | F::R64G64B64_SINT | F::R64G64B64_SFLOAT => 3,
+        F::R64G64B64A64_UINT | F::R64G64B64A64_SINT | F::R64G64B64A64_SFLOAT => 4,
+        _ => 0,
+    }
+}
+
+/// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB.
 /// Programs can read texels of any format that isn't scaled or compressed, and has no unused bits.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     if !is_color(format) || is_compressed(format) || format.has(Channel::X) {
@@ -133,7 +147,7 @@ fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
         return vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
     let mut features = vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
-    if !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent) {
+    if format.numeric() != Numeric::Srgb {
         features |= vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
     if is_stored(format) {
@@ -156,7 +170,9 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
         };
     }
     let Some(format) = device_format(format) else {
-        return vk::FormatProperties::default();
+        let is_wide = wide_components(format) > 0;
+        let vertices = if is_wide { vk::FormatFeatureFlags::VERTEX_BUFFER } else { vk::FormatFeatureFlags::empty() };
+        return vk::FormatProperties { buffer_features: vertices, ..vk::FormatProperties::default() };
     };
     // Texels, or blocks of them, lie in rows with either tiling.
     let linear = if is_color(format) { image_features(format) } else { vk::FormatFeatureFlags::empty() };
@@ -188,11 +204,13 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
         | vk::ImageCreateFlags::BLOCK_TEXEL_VIEW_COMPATIBLE.as_raw()
+        | vk::ImageCreateFlags::MULTISAMPLED_RENDER_TO_SINGLE_SAMPLED_EXT.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
         | vk::ImageCreateFlags::DISJOINT.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
         | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw()
-        | vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT.as_raw(),
+        | vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT.as_raw()
+        | vk::ImageCreateFlags::SPLIT_INSTANCE_BIND_REGIONS.as_raw(),
 );
 
 /// The features that usages require; other usages are not supported.
@@ -307,13 +325,12 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
             false => refuse(format!("{ty:?} images of format {format:?} are not supported")),
         };
     }
-    let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
     let (max_extent, layers) = match ty {
         vk::ImageType::TYPE_1D if !is_compressed => (extent(limits::MAX_IMAGE_DIMENSION, 1, 1), limits::MAX_LAYERS),
         vk::ImageType::TYPE_2D => {
             (extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1), limits::MAX_LAYERS)
         }
-        vk::ImageType::TYPE_3D if !is_depth_stencil => {
+        vk::ImageType::TYPE_3D => {
             let side = limits::MAX_IMAGE_DIMENSION_3D;
             (extent(side, side, side), 1)
         }
@@ -322,6 +339,10 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         }
     };
     let is_linear = tiling == vk::ImageTiling::LINEAR;
+    let is_split = flags.contains(vk::ImageCreateFlags::SPLIT_INSTANCE_BIND_REGIONS);
+    if is_split && (is_linear || ty != vk::ImageType::TYPE_2D) {
+        return refuse(format!("{tiling:?} images of {ty:?} are not split over devices"));
+    }
     let is_attachment = features.intersects(ATTACHMENT);
     let has_samples = is_attachment
         && !is_linear
@@ -330,8 +351,8 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
     Ok(vk::ImageFormatProperties {
         max_extent,
-        max_mip_levels: max_extent.width.ilog2() + 1,
-        max_array_layers: layers,
+        max_mip_levels: if is_split { 1 } else { max_extent.width.ilog2() + 1 },
+        max_array_layers: if is_split { 1 } else { layers },
         sample_counts: if has_samples { limits::SAMPLE_COUNTS } else { vk::SampleCountFlags::TYPE_1 },
         max_resource_size: memory::heap_size(),
     })

@@ -80,7 +80,7 @@ pub(crate) const MAX_INLINE_UNIFORM_BLOCK_SIZE: u32 = 4096;
 const INLINE_UNIFORM_BLOCKS: u32 = 64;
 
 /// The most descriptors with dynamic offsets.
-const DYNAMIC_DESCRIPTORS: u32 = 64;
+const DYNAMIC_DESCRIPTORS: u32 = 256;
 
 /// The alignment of offsets of uniform, storage and texel buffers.
 pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
@@ -104,10 +104,10 @@ const MAX_PATCH_COMPONENTS: u32 = 128;
 const MAX_GEOMETRY_INVOCATIONS: u32 = 127;
 
 /// The most vertices that an invocation of a geometry shader emits.
-const MAX_GEOMETRY_VERTICES: u32 = 256;
+const MAX_GEOMETRY_VERTICES: u32 = 1024;
 
-/// The most scalars of all vertices that an invocation of a geometry shader emits.
-const MAX_GEOMETRY_COMPONENTS: u32 = 1024;
+/// The most scalars of all vertices that an invocation of a geometry shader emits: a position for each.
+const MAX_GEOMETRY_COMPONENTS: u32 = 4 * MAX_GEOMETRY_VERTICES;
 
 /// The most bytes of a vertex that transform feedback writes: those of all varyings.
 const MAX_CAPTURED_BYTES: u32 = 4 * MAX_VARYING_COMPONENTS;
@@ -220,7 +220,7 @@ fn find_properties() -> Properties {
         max_geometry_total_output_components: MAX_GEOMETRY_COMPONENTS,
         max_fragment_input_components: MAX_VARYING_COMPONENTS,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
-        max_fragment_dual_src_attachments: 1,
+        max_fragment_dual_src_attachments: MAX_COLOR_ATTACHMENTS,
         max_fragment_combined_output_resources: DESCRIPTORS,
         max_compute_shared_memory_size: MAX_SHARED_BYTES,
         max_compute_work_group_count: [MAX_WORKGROUP_COUNT; 3],
@@ -245,10 +245,10 @@ fn find_properties() -> Properties {
         max_texel_offset: *TEXEL_OFFSETS.end() as u32,
         min_texel_gather_offset: *TEXEL_OFFSETS.start(),
         max_texel_gather_offset: *TEXEL_OFFSETS.end() as u32,
-        min_interpolation_offset: -0.5,
-        // The greatest offset is half a pixel less one step of its precision.
-        max_interpolation_offset: 0.5 - 1.0 / 16.0,
-        sub_pixel_interpolation_offset_bits: 4,
+        // Offsets are binary32 and not limited; inputs are extrapolated by their derivatives.
+        min_interpolation_offset: -2.0,
+        max_interpolation_offset: 2.0,
+        sub_pixel_interpolation_offset_bits: 8,
         max_framebuffer_width: MAX_IMAGE_DIMENSION,
         max_framebuffer_height: MAX_IMAGE_DIMENSION,
         max_framebuffer_layers: MAX_LAYERS,
@@ -269,7 +269,7 @@ fn find_properties() -> Properties {
         max_cull_distances: MAX_CLIP_CULL_DISTANCES,
         max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
         discrete_queue_priorities: 2,
-        point_size_range: [1.0, MAX_POINT_SIZE],
+        point_size_range: [0.0, MAX_POINT_SIZE],
         line_width_range: [1.0, MAX_LINE_WIDTH],
         point_size_granularity: SIZE_GRANULARITY,
         line_width_granularity: SIZE_GRANULARITY,
@@ -373,7 +373,7 @@ fn find_properties() -> Properties {
         max_custom_border_color_samplers: 1 << 16,
         max_multi_draw_count: 1 << 16,
         line_sub_pixel_precision_bits: 8,
-        dynamic_primitive_topology_unrestricted: false,
+        dynamic_primitive_topology_unrestricted: true,
         // Every access is checked against the range itself, scalar by scalar.
         robust_storage_buffer_access_size_alignment: 1,
         robust_uniform_buffer_access_size_alignment: 1,

@@ -104,6 +104,10 @@ pub(crate) fn get_physical_device_format_properties2(
     let found = formats::properties(format);
     format_properties.format_properties = found;
     format_properties.for_each_chained(|mut structure| {
+        if let Some(out) = structure.cast::<vk::SubpassResolvePerformanceQueryEXT<'_>>() {
+            // Tiles are resolved before they leave the tile buffers.
+            out.optimal = vk::TRUE;
+        }
         if let Some(out) = structure.cast::<vk::FormatProperties3<'_>>() {
             let widen = |features| formats::features2(format, features);
             out.linear_tiling_features = widen(found.linear_tiling_features);

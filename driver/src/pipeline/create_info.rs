@@ -324,6 +324,8 @@ unsafe fn read_output(
                 own.color_write_enables = enables.to_vec();
             }
             own.blend_constants = state.blend_constants;
+            let flag = vk::PipelineColorBlendStateCreateFlags::RASTERIZATION_ORDER_ATTACHMENT_ACCESS_EXT;
+            own.reads_colors = state.flags.contains(flag);
         }
     }
     Ok(())

@@ -10,10 +10,8 @@ use super::link_primitives::{
     self, Given, TessellationShaders, carry_written, components_written, given, gives_memory, output_given,
 };
 use super::varyings::{InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs};
-use crate::abi::error::Error;
 use gaurast_spirv::{
-    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling, ScalarType,
-    Shader,
+    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling, Shader,
 };
 use simdevice::isa::ir::Output as ProgramOutput;
 use simdevice::program::interface;
@@ -44,15 +42,11 @@ impl StageShaders {
 }
 
 /// Links programs. `stream` gives the attribute stream of a vertex input's location.
-///
-/// # Errors
-/// [`Error::FeatureNotPresent`] if the device can't pass the values between the stages.
 pub(crate) fn link(
     mut shaders: StageShaders,
     stream: impl Fn(u32) -> Option<usize>,
     live_outputs: LiveOutputs<'_>,
-) -> Result<DrawPrograms, Error> {
-    check_attributes(&shaders.vertex.interface)?;
+) -> DrawPrograms {
     let evaluation = shaders.tessellation.as_mut().map(|it| &mut it.evaluation);
     let last = shaders.geometry.as_mut().or(evaluation);
     let last = last.unwrap_or(&mut shaders.vertex);
@@ -77,7 +71,7 @@ pub(crate) fn link(
     let programs = vertex_programs(vertex, stream, |target| output(target, &of_vertices));
     let none = Given::new();
     let of_last = of_evaluation.as_ref().or(of_vertices.as_ref());
-    Ok(DrawPrograms {
+    DrawPrograms {
         varyings: read,
         captured,
         tessellation: tessellation.map(|shaders| {
@@ -88,24 +82,20 @@ pub(crate) fn link(
             .map(|shader| link_primitives::geometry(shader, of_last.unwrap_or(&none), &varyings, live_outputs)),
         fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, live_outputs)),
         ..programs
-    })
+    }
 }
 
 /// Links a vertex program that projects Gaussians: its outputs `components` become varyings, in this order.
-///
-/// # Errors
-/// As [`link`].
 pub(crate) fn link_projection(
     vertex: Shader,
     stream: impl Fn(u32) -> Option<usize>,
     components: &[InterfaceComponent],
-) -> Result<DrawPrograms, Error> {
-    check_attributes(&vertex.interface)?;
+) -> DrawPrograms {
     let varyings: Varyings = components.iter().copied().zip(0..).collect();
-    Ok(DrawPrograms {
+    DrawPrograms {
         varyings: components.len() as u32,
         ..vertex_programs(vertex, stream, |target| vertex_output(target, &varyings, LiveOutputs::default()))
-    })
+    }
 }
 
 /// Links a fragment program that computes colours from the accumulated values of Gaussians. `varyings` gives their
@@ -154,24 +144,11 @@ fn fragment_programs(fragment: Shader, varyings: &Varyings, live_outputs: LiveOu
         inputs,
         outputs,
         early_tests: interface.early_fragment_tests,
+        post_depth_coverage: interface.post_depth_coverage,
         discards: interface.discards,
         per_sample: interface.per_sample,
         has_side_effects: interface.has_side_effects,
     }
-}
-
-/// Refuses attributes of 64 bits.
-fn check_attributes(vertex: &Interface) -> Result<(), Error> {
-    let is_wide = |input: &Input| {
-        matches!(
-            input.numeric,
-            ScalarType::Float { width: 64 } | ScalarType::Int { width: 64 } | ScalarType::Uint { width: 64 }
-        )
-    };
-    if vertex.inputs.iter().any(is_wide) {
-        return Err(Error::FeatureNotPresent("an input of 64 bits in the vertex shader".into()));
-    }
-    Ok(())
 }
 
 /// The location, which no application can use, for outputs that are captured, each of which is a component.
@@ -357,7 +334,7 @@ fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<Fra
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gaurast_spirv::{PrimitiveModes, Stage, VertexExchange};
+    use gaurast_spirv::{PrimitiveModes, ScalarType, Stage, VertexExchange};
     use simdevice::isa::builder::Builder;
     use simdevice::isa::ir::Program;
     use simdevice::isa::ir::Rate;
@@ -407,6 +384,7 @@ mod tests {
                 push_constants: None,
                 workgroup_size: [1; 3],
                 early_fragment_tests: false,
+                post_depth_coverage: false,
                 depth: DepthMode::NotWritten,
                 discards: false,
                 per_sample: false,
@@ -433,7 +411,7 @@ mod tests {
         let fragment = shader(Stage::Fragment, vec![at(2, 0), at(9, 0), at(0, 3)], vec![to(0, 0), to(1, 0), to(0, 1)]);
         let live_outputs = LiveOutputs { color: &[true, false], ..LiveOutputs::default() };
         let stream = |location| (location == 7).then_some(3);
-        let linked = link(stages(vertex, Some(fragment)), stream, live_outputs).unwrap();
+        let linked = link(stages(vertex, Some(fragment)), stream, live_outputs);
         assert_eq!(linked.varyings, 2);
         assert_eq!(linked.vertex_inputs, [Some(VertexInput::Attribute { stream: 3, component: 1 }), None]);
         assert_eq!(
@@ -482,7 +460,7 @@ mod tests {
         let inputs =
             vec![read(BuiltIn::ClipDistance, 1), read(BuiltIn::CullDistance, 0), read(BuiltIn::CullDistance, 3)];
         let fragment = shader(Stage::Fragment, inputs, vec![to(0, 0)]);
-        let linked = link(stages(vertex, Some(fragment)), |_| None, LiveOutputs::default()).unwrap();
+        let linked = link(stages(vertex, Some(fragment)), |_| None, LiveOutputs::default());
         assert_eq!(linked.varyings, 2);
         let outputs = [
             VertexOutput::ClipDistance(0),
@@ -503,14 +481,5 @@ mod tests {
         };
         let inputs = linked.fragment.unwrap().inputs;
         assert_eq!(inputs, [varying(1), varying(0), None]);
-    }
-
-    #[test]
-    fn wide_attributes_are_refused() {
-        let mut wide = at(0, 0);
-        wide.numeric = ScalarType::Float { width: 64 };
-        let vertex = shader(Stage::Vertex, vec![wide], vec![]);
-        let error = link(stages(vertex, None), |_| None, LiveOutputs::default()).unwrap_err();
-        assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);
     }
 }

@@ -148,6 +148,8 @@ pub(crate) struct FragmentOutputState {
     pub(crate) color_formats: Vec<vk::Format>,
     /// True if the subpass has a depth or stencil attachment.
     pub(crate) has_depth_stencil: bool,
+    /// True if fragments read colour attachments in rasterization order.
+    pub(crate) reads_colors: bool,
 }
 
 impl Default for FragmentOutputState {
@@ -161,6 +163,7 @@ impl Default for FragmentOutputState {
             blend_constants: [0.0; 4],
             color_formats: Vec::new(),
             has_depth_stencil: false,
+            reads_colors: false,
         }
     }
 }
@@ -190,6 +193,15 @@ impl GraphicsState {
             self.add_layout(layout);
         }
         Ok(())
+    }
+
+    /// Reports whether fragments read attachments in rasterization order.
+    pub(super) fn reads_attachments(&self) -> bool {
+        use vk::PipelineDepthStencilStateCreateFlags as F;
+        let reading =
+            F::RASTERIZATION_ORDER_ATTACHMENT_DEPTH_ACCESS_EXT | F::RASTERIZATION_ORDER_ATTACHMENT_STENCIL_ACCESS_EXT;
+        let depth_stencil = self.fragment_shader.depth_stencil;
+        self.fragment_output.reads_colors || depth_stencil.is_some_and(|state| state.flags.intersects(reading))
     }
 
     /// Adds parts to those that are there.

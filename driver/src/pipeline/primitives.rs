@@ -105,6 +105,7 @@ impl PrimitivePipeline {
             second_source: graphics.fragment_output.blend.iter().any(reads_second_source)
                 || graphics.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
             points: state::class(fixed.draw.topology) == Class::Points
+                || graphics.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
                 || shaders.geometry.is_some()
                 || shaders.tessellation.is_some()
                 || graphics.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)
@@ -112,7 +113,7 @@ impl PrimitivePipeline {
             views: graphics.pre_rasterization.view_mask != 0,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
-        let programs = link::link(shaders, stream, live_outputs)?;
+        let programs = link::link(shaders, stream, live_outputs);
         let programs = DrawPipeline::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static = dynamic.is_empty() && viewports == ViewportSource::Static && scissors == ViewportSource::Static;

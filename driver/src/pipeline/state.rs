@@ -77,14 +77,22 @@ fn unsuitable(name: &str, location: u32, what: &str) -> Error {
 /// # Errors
 /// The problem with the attribute, as the end of a sentence about its location.
 pub(crate) fn source(input: &VertexInput, location: u32) -> Result<AttributeSource, String> {
-    let attribute = input.attributes.iter().find(|a| a.location == location);
-    let attribute = attribute.ok_or("which the vertex input state does not have")?;
+    let at = |location: u32| input.attributes.iter().find(move |attribute| attribute.location == location);
+    // Components of 64 bits are read as two words each, of which a location has four.
+    let first = at(location).map(|attribute| (attribute, 0));
+    let second = || Some((at(location.checked_sub(1)?)?, 1));
+    let found = first.or_else(|| second().filter(|(attribute, _)| wide_words(attribute.format) > 4));
+    let (attribute, half) = found.ok_or("which the vertex input state does not have")?;
     let number = attribute.binding;
     let binding = input.bindings.iter().find(|b| b.binding == number);
     let binding = binding.ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
     let features = formats::properties(attribute.format).buffer_features;
-    let format =
-        formats::device_format(attribute.format).filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    let format = match wide_words(attribute.format) - 4 * half {
+        words if words <= 0 => formats::device_format(attribute.format),
+        2 => Some(Format::R32G32Uint),
+        _ => Some(Format::R32G32B32A32Uint),
+    };
+    let format = format.filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
     let format = format.ok_or_else(|| {
         format!("whose format {:?} this device does not read as a vertex attribute", attribute.format)
     })?;
@@ -96,7 +104,13 @@ pub(crate) fn source(input: &VertexInput, location: u32) -> Result<AttributeSour
         }
         rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
     };
-    Ok(AttributeSource { binding: number, stride: binding.stride, offset: attribute.offset, format, instance_divisor })
+    let offset = attribute.offset.saturating_add(16 * half as u32);
+    Ok(AttributeSource { binding: number, stride: binding.stride, offset, format, instance_divisor })
+}
+
+/// The number of 32-bit words of a format of 64-bit components; 0 for other formats.
+fn wide_words(format: vk::Format) -> i32 {
+    2 * formats::wide_components(format) as i32
 }
 
 /// The state of a single colour attachment.
@@ -337,6 +351,7 @@ impl FixedFunctionState {
             logic_op: None,
             blend: Vec::new(),
             blend_constants: [0.0; 4],
+            reads_attachments: graphics.reads_attachments(),
         };
         let mut state = Self {
             draw,
@@ -661,7 +676,7 @@ pub(crate) enum Class {
     Patches,
 }
 
-/// The class of a topology. A dynamic topology must stay in its class.
+/// The class of a topology.
 pub(crate) fn class(topology: Topology) -> Class {
     match topology {
         Topology::PointList => Class::Points,

@@ -162,6 +162,12 @@ features! {
         c"VK_AMD_shader_early_and_late_fragment_tests" {
         shaderEarlyAndLateFragmentTests => shader_early_and_late_fragment_tests: true;
     }
+    structure vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT:
+        c"VK_ARM_rasterization_order_attachment_access" {
+        rasterizationOrderColorAttachmentAccess => rasterization_order_color_attachment_access: false;
+        rasterizationOrderDepthAttachmentAccess => rasterization_order_depth_attachment_access: false;
+        rasterizationOrderStencilAttachmentAccess => rasterization_order_stencil_attachment_access: false;
+    }
     structure vk::PhysicalDevice4444FormatsFeaturesEXT: c"VK_EXT_4444_formats" {
         formatA4R4G4B4 => format_a4r4g4b4: true;
         formatA4B4G4R4 => format_a4b4g4r4: true;
@@ -258,6 +264,10 @@ features! {
     }
     structure vk::PhysicalDeviceMultiDrawFeaturesEXT: c"VK_EXT_multi_draw" {
         multiDraw => multi_draw: true;
+    }
+    structure vk::PhysicalDeviceMultisampledRenderToSingleSampledFeaturesEXT:
+        c"VK_EXT_multisampled_render_to_single_sampled" {
+        multisampledRenderToSingleSampled => multisampled_render_to_single_sampled: true;
     }
     structure vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT: c"VK_EXT_non_seamless_cube_map" {
         nonSeamlessCubeMap => non_seamless_cube_map: true;

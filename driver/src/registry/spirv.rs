@@ -124,7 +124,7 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
         Capability::GroupNonUniformPartitionedEXT => {
             &[Absent("shaderSubgroupPartitioned"), Absent("subgroupSupportedOperations")]
         }
-        Capability::SampleMaskPostDepthCoverage => &[Absent("VK_EXT_post_depth_coverage")],
+        Capability::SampleMaskPostDepthCoverage => &[Extension(c"VK_EXT_post_depth_coverage")],
         Capability::RuntimeDescriptorArray => &[Feature("runtimeDescriptorArray")],
         Capability::InputAttachmentArrayDynamicIndexing => &[Feature("shaderInputAttachmentArrayDynamicIndexing")],
         Capability::UniformTexelBufferArrayDynamicIndexing => {

@@ -536,6 +536,41 @@ pub(crate) fn bind_image_memory(image: &Image, memory: &Memory, memory_offset: v
     image.bind(memory.allocation(), memory_offset, None)
 }
 
+/// Checks that the parts of an image, one for each instance of memory, are what a group of one device has: the memory of
+/// device 0, and the whole image.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] if a device or a part isn't there, or the parts don't cover the image.
+pub(crate) fn check_instances(image: &Image, devices: &[u32], regions: &[vk::Rect2D]) -> Result<(), Error> {
+    if devices.len() > 1 {
+        return Err(Error::usage(
+            "VUID-VkBindImageMemoryDeviceGroupInfo-deviceIndexCount-01634",
+            format!("there are {} device indices, and the group has one device", devices.len()),
+        ));
+    }
+    if let Some(device) = devices.iter().find(|&&device| device != 0) {
+        return Err(Error::usage(
+            "VUID-VkBindImageMemoryDeviceGroupInfo-pDeviceIndices-01635",
+            format!("the group has no device {device}"),
+        ));
+    }
+    if regions.len() > 1 {
+        return Err(Error::usage(
+            "VUID-VkBindImageMemoryDeviceGroupInfo-splitInstanceBindRegionCount-01636",
+            format!("there are {} regions, and the group has one device", regions.len()),
+        ));
+    }
+    let [width, height, _] = image.desc.extent;
+    let whole = vk::Rect2D::default().extent(vk::Extent2D { width, height });
+    if let Some(region) = regions.iter().find(|&&region| region != whole) {
+        return Err(Error::usage(
+            "VUID-VkBindImageMemoryInfo-pNext-01629",
+            format!("{region:?} is not the whole image of {width}x{height}, and there is no other device for the rest"),
+        ));
+    }
+    Ok(())
+}
+
 /// # Safety
 /// The create info's chain and its handles are valid.
 #[doc(alias = "vkCreateImageView")]

@@ -14,7 +14,9 @@ pub use draw::{
     Activations, AttributeStream, DecodingTables, Dispatch, Draw, GaussianAppend, GaussianAttributes, GaussianBegin,
     GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
 };
-pub use rendering::{Attachment, AttachmentClear, AttachmentResolve, ClearAttachments, LoadOp, Rendering, StoreOp};
+pub use rendering::{
+    Attachment, AttachmentClear, AttachmentResolve, ClearAttachments, LoadOp, Multisampled, Rendering, StoreOp,
+};
 pub use transfer::{
     BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
     ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,

@@ -37,6 +37,18 @@ pub struct Attachment {
     pub store: StoreOp,
     /// The resolve of the pass's area at the end, if there is one. `store` does not apply to it.
     pub resolve: Option<AttachmentResolve>,
+    /// The samples with which an attachment of one sample per texel is rendered to, if there are several.
+    pub multisampled: Option<Multisampled>,
+}
+
+/// Samples that an attachment has during a pass alone. Each begins as the view's texel, and the view receives their
+/// combination at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Multisampled {
+    /// The number of samples per texel.
+    pub samples: u32,
+    /// The combination of samples.
+    pub mode: ResolveMode,
 }
 
 /// The resolve of an attachment.

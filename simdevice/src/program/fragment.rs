@@ -36,6 +36,7 @@ pub(crate) struct Interface {
     pub sample_mask: Option<u32>,
     pub stencil_reference: Option<u32>,
     pub early_tests: bool,
+    pub post_depth_coverage: bool,
     pub discards: bool,
     pub per_sample: bool,
     pub has_side_effects: bool,
@@ -95,6 +96,7 @@ impl Interface {
     fn new(programs: &FragmentPrograms, executable: &Executable) -> Self {
         let mut interface = Self {
             early_tests: programs.early_tests,
+            post_depth_coverage: programs.post_depth_coverage,
             discards: programs.discards,
             per_sample: programs.per_sample,
             has_side_effects: programs.has_side_effects,

@@ -207,6 +207,8 @@ pub struct FragmentPrograms {
     pub outputs: Vec<Option<FragmentOutput>>,
     /// True if depth and stencil are tested before the program, whatever it does.
     pub early_tests: bool,
+    /// True if the sample mask that the program reads is that after early tests.
+    pub post_depth_coverage: bool,
     /// True if the program may discard fragments or demote invocations to helpers.
     pub discards: bool,
     /// True if the program must run once for each sample.

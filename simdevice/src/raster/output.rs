@@ -2,6 +2,7 @@
 
 use crate::program::fragment::FragmentStage;
 use crate::raster::color::ColorOutput;
+use crate::raster::tile::Tile;
 use crate::raster::tile_buffer::{Target, TileBuffer};
 use crate::simd::as_floats;
 use crate::state::{BlendState, LogicOp};
@@ -38,6 +39,19 @@ pub struct Buffers {
     pub color: Vec<TileBuffer>,
     pub depth: TileBuffer,
     pub stencil: TileBuffer,
+}
+
+impl Buffers {
+    /// Writes a tile to the memory of all attachments that it may differ from, and keeps it.
+    pub fn write_through(&mut self, targets: Targets<'_>, layer: u32, tile: &Tile) {
+        let colors = self.color.iter_mut().zip(targets.color.iter().map(Option::as_ref));
+        let rest = [(&mut self.depth, targets.depth), (&mut self.stencil, targets.stencil)];
+        for (buffer, target) in colors.chain(rest) {
+            if let Some(target) = target {
+                buffer.write_through(target, layer, tile);
+            }
+        }
+    }
 }
 
 /// The attachments of a pass.

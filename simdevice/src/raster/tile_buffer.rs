@@ -14,10 +14,11 @@ use crate::format::depth::{ordered, unordered};
 use crate::format::unorm8::{pack_unorm8, unorm8_fraction};
 use crate::format::{Aspect, Format, MAX_TEXEL_SIZE};
 use crate::image::resolve::resolve_row;
-use crate::image::{Image, ImageKind, ImageView, SubresourceLayout};
+use crate::image::{Image, ImageDesc, ImageKind, ImageView, SubresourceLayout};
 use crate::limits::{MAX_FRAMEBUFFER_SIZE, MAX_SAMPLES, TILE_SIZE};
 use crate::packet::StoreOp;
 use crate::state::{Rect, ResolveMode};
+use devmem::Allocation;
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::{Level, Simd, f32x16, prelude::*, u32x16};
@@ -206,7 +207,11 @@ impl TileBuffer {
                 fill(texels, &unpack(format, clear)[..stride]);
                 continue;
             }
-            let Some(rows) = target.sample(layer, sample as u32) else {
+            let rows = match &target.initial {
+                Some(single) => single.sample(layer, 0),
+                None => target.sample(layer, sample as u32),
+            };
+            let Some(rows) = rows else {
                 continue;
             };
             let size = format.texel_size();
@@ -229,9 +234,23 @@ impl TileBuffer {
         }
     }
 
+    /// Stores a tile that is touched or cleared, and keeps it.
+    pub fn write_through(&mut self, target: &Target, layer: u32, tile: &Tile) {
+        if target.clear.is_some() || target.initial.is_some() {
+            self.load_or_clear(target, layer, tile);
+        }
+        if self.is_touched(tile.index) {
+            self.finish(target, layer, tile, true);
+            self.touched |= 1 << tile.index;
+        }
+    }
+
     /// Stores a touched tile, if `keep`. Clears an untouched one in memory, if the pass clears it. Afterwards the tile
     /// is untouched.
     pub fn finish(&mut self, target: &Target, layer: u32, tile: &Tile, keep: bool) {
+        if keep && target.initial.is_some() {
+            self.load_or_clear(target, layer, tile);
+        }
         let touched = self.is_touched(tile.index);
         self.touched &= !(1 << tile.index);
         self.changed(tile.index);
@@ -371,6 +390,7 @@ fn fill(bytes: &mut [u8], texel: &[u8]) {
         2 => fill_each::<2>(bytes, texel),
         4 => fill_each::<4>(bytes, texel),
         8 => fill_each::<8>(bytes, texel),
+        12 => fill_each::<12>(bytes, texel),
         16 => fill_each::<16>(bytes, texel),
         size => bytes.chunks_exact_mut(size).for_each(|chunk| chunk.copy_from_slice(texel)),
     }
@@ -389,6 +409,7 @@ fn get_row(texels: &[u8], size: usize, y: usize, first: usize, row: &mut [u8]) {
         2 => get_each::<2>(texels, y, first, row),
         4 => get_each::<4>(texels, y, first, row),
         8 => get_each::<8>(texels, y, first, row),
+        12 => get_each::<12>(texels, y, first, row),
         16 => get_each::<16>(texels, y, first, row),
         size => {
             for (x, texel) in row.chunks_exact_mut(size).enumerate() {
@@ -420,6 +441,7 @@ fn set_row(texels: &mut [u8], size: usize, y: usize, first: usize, row: &[u8]) {
         2 => set_each::<2>(texels, y, first, row),
         4 => set_each::<4>(texels, y, first, row),
         8 => set_each::<8>(texels, y, first, row),
+        12 => set_each::<12>(texels, y, first, row),
         16 => set_each::<16>(texels, y, first, row),
         size => {
             for (x, texel) in row.chunks_exact(size).enumerate() {
@@ -561,6 +583,9 @@ pub enum AttachmentError {
     /// The number of samples is neither 1 nor [`MAX_SAMPLES`].
     #[error("attachments of {0} samples cannot be rendered to")]
     Samples(u32),
+    /// The host cannot back this many bytes of samples that last as long as the pass.
+    #[error("the host cannot back {0} bytes of an attachment's samples")]
+    Memory(u64),
     /// The image is wider or higher than [`MAX_FRAMEBUFFER_SIZE`].
     #[error("an attachment of {0}x{1} pixels is too large")]
     Extent(u32, u32),
@@ -575,6 +600,8 @@ pub struct Target {
     layers: Vec<(SubresourceLayout, u32)>,
     /// The bytes of the texel to which the attachment is still to be cleared.
     pub clear: Option<[u8; MAX_TEXEL_SIZE]>,
+    /// The target of one sample per texel whose texels all samples are still to begin as.
+    pub initial: Option<Box<Target>>,
     /// The operation at the end of the pass.
     pub store: StoreOp,
 }
@@ -609,7 +636,34 @@ impl Target {
         if width.max(height) > MAX_FRAMEBUFFER_SIZE {
             return Err(AttachmentError::Extent(width, height));
         }
-        Ok(Self { image: image.clone(), format, layers, clear: None, store })
+        Ok(Self { image: image.clone(), format, layers, clear: None, initial: None, store })
+    }
+
+    /// A target of its format, extent and layers with several samples per texel, in memory of its own that is not stored
+    /// when a pass ends.
+    pub fn with_samples(&self, samples: u32) -> Result<Self, AttachmentError> {
+        let [width, height] = self.extent();
+        let desc = ImageDesc {
+            kind: ImageKind::D2,
+            format: self.format,
+            extent: [width, height, 1],
+            mip_levels: 1,
+            array_layers: self.layer_count(),
+            samples,
+        };
+        let size = desc.memory_size().ok_or(AttachmentError::Samples(samples))?;
+        let memory = Allocation::new_zeroed(size).map_err(|_| AttachmentError::Memory(size))?;
+        let image = Image::new(desc, memory, 0).map_err(|_| AttachmentError::Samples(samples))?;
+        let view = ImageView {
+            image: Arc::new(image),
+            format: self.format,
+            base_mip_level: 0,
+            level_count: 1,
+            base_layer: 0,
+            layer_count: self.layer_count(),
+        };
+        let aspect = self.format.aspects()[0];
+        Self::new(&view, aspect, self.layer_count(), StoreOp::DontCare)
     }
 
     /// The format of its texels.

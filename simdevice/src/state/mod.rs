@@ -371,6 +371,8 @@ pub struct DrawState {
     pub blend: Vec<BlendState>,
     /// The constants of the constant blend factors.
     pub blend_constants: [f32; 4],
+    /// True if fragments read, as input attachments, what all primitives before theirs have left in the pixel.
+    pub reads_attachments: bool,
 }
 
 impl DrawState {
@@ -416,6 +418,7 @@ impl DrawState {
             logic_op: None,
             blend: Vec::new(),
             blend_constants: [0.0; 4],
+            reads_attachments: false,
         }
     }
 }

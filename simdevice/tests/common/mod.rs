@@ -59,7 +59,7 @@ pub fn bytes(view: &ImageView) -> Vec<u8> {
 
 /// An attachment that is stored.
 pub fn attachment(view: &ImageView, load: LoadOp) -> Attachment {
-    Attachment { view: view.clone(), load, store: StoreOp::Store, resolve: None }
+    Attachment { view: view.clone(), load, store: StoreOp::Store, resolve: None, multisampled: None }
 }
 
 /// A pass over one colour attachment.

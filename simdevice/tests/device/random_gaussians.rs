@@ -344,6 +344,7 @@ fn fragment_stage(
         inputs: (0..4).map(|number| Some(input(number))).collect(),
         outputs: (0..4).map(|component| Some(FragmentOutput::Color { attachment: 0, component, index: 0 })).collect(),
         early_tests: false,
+        post_depth_coverage: false,
         discards: false,
         per_sample: false,
         has_side_effects: false,

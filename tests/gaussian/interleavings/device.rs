@@ -88,6 +88,7 @@ fn programs() -> DrawPrograms {
             inputs: inputs.collect(),
             outputs: outputs.collect(),
             early_tests: false,
+            post_depth_coverage: false,
             discards: false,
             per_sample: false,
             has_side_effects: false,
@@ -320,6 +321,7 @@ fn begin_pass(resources: &Resources, clear: Option<([f32; 4], f32)>) -> Packet {
             load: value.map_or(LoadOp::Load, LoadOp::Clear),
             store: StoreOp::Store,
             resolve: None,
+            multisampled: None,
         })
     };
     let color = clear.map(|(color, _)| ClearValue::Float(color));

@@ -250,6 +250,7 @@ impl Case<'_> {
             load: LoadOp::Clear(value),
             store: StoreOp::Store,
             resolve: None,
+            multisampled: None,
         };
         let everything = Rect { x: 0, y: 0, width: SIZE[0], height: SIZE[1] };
         let stored = ClearValue::DepthStencil { depth: 0.5, stencil: 0 };

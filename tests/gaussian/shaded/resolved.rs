@@ -35,6 +35,7 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> GaussianF
         inputs: inputs.iter().copied().map(Some).collect(),
         outputs: (0..inputs.len()).map(|slot| Some(output(slot))).collect(),
         early_tests: false,
+        post_depth_coverage: false,
         discards: false,
         per_sample: false,
         has_side_effects: false,

@@ -269,6 +269,7 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
             },
             store: bytes.one(&[StoreOp::Store, StoreOp::Store, StoreOp::DontCare, StoreOp::None]),
             resolve: None,
+            multisampled: None,
         };
         let mut attachment = of(image);
         if bytes.rarely(6) {

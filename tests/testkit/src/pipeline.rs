@@ -98,6 +98,8 @@ pub struct Graphics<'a> {
     pub blend: Vec<vk::PipelineColorBlendAttachmentState>,
     /// Constants for blending.
     pub blend_constants: [f32; 4],
+    /// Flags of blending.
+    pub blend_flags: vk::PipelineColorBlendStateCreateFlags,
     /// Dynamic states.
     pub dynamic: Vec<vk::DynamicState>,
     /// Formats of colour attachments, for dynamic rendering.
@@ -150,6 +152,7 @@ impl Default for Graphics<'_> {
             logic_op: None,
             blend: vec![opaque()],
             blend_constants: [0.0; 4],
+            blend_flags: vk::PipelineColorBlendStateCreateFlags::empty(),
             dynamic: vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR],
             formats: vec![vk::Format::R32G32B32A32_SFLOAT],
             depth_format: vk::Format::UNDEFINED,
@@ -273,6 +276,7 @@ impl Graphics<'_> {
             multisample = multisample.sample_mask(&mask);
         }
         let blend = vk::PipelineColorBlendStateCreateInfo::default()
+            .flags(self.blend_flags)
             .attachments(&self.blend)
             .logic_op_enable(self.logic_op.is_some())
             .logic_op(self.logic_op.unwrap_or_default())
@@ -422,6 +426,8 @@ pub struct PipelineOptions<'a> {
     pub blend: Vec<vk::PipelineColorBlendAttachmentState>,
     /// Constants for blending.
     pub blend_constants: [f32; 4],
+    /// Flags of blending.
+    pub blend_flags: vk::PipelineColorBlendStateCreateFlags,
     /// A logic operation instead of blending.
     pub logic_op: Option<vk::LogicOp>,
     /// Dynamic states in addition to viewport and scissor.
@@ -462,6 +468,7 @@ impl Default for PipelineOptions<'_> {
             depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default(),
             blend: Vec::new(),
             blend_constants: [0.0; 4],
+            blend_flags: vk::PipelineColorBlendStateCreateFlags::empty(),
             logic_op: None,
             dynamic: Vec::new(),
             bindings: None,
@@ -563,6 +570,7 @@ impl Pipeline {
             logic_op: options.logic_op,
             blend,
             blend_constants: options.blend_constants,
+            blend_flags: options.blend_flags,
             dynamic,
             formats: formats.colors,
             depth_format: formats.depth,

@@ -2,5 +2,6 @@
 //!
 //! Unit tests: `driver/src/physical_device`, `driver/src/registry`.
 
+mod draw_limits;
 mod limits;
 mod robust_access;

@@ -2,6 +2,8 @@
 //!
 //! Unit tests: `driver/src/resource`.
 
+mod device_groups;
 mod device_memory;
 mod extended_usage;
 mod linear_images;
+mod volumes_of_depths;

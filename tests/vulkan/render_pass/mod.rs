@@ -3,6 +3,8 @@
 //! Unit tests: `driver/src/render_pass.rs`.
 
 mod feedback_loop;
+mod multisampled_to_single;
 mod multiview;
 mod passes;
+mod rasterization_order;
 mod subpasses;

@@ -1,3 +1,4 @@
 //! The chapter *Shader Interfaces*.
 
+mod wide_attributes;
 mod wide_values;

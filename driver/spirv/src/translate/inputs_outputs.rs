@@ -268,8 +268,7 @@ impl<'a> InputsOutputs<'a> {
     pub fn input_scalar(&mut self, emit: &mut Emitter, variable: u32, index: usize, scalar: Scalar) -> Result<Reg> {
         let locations = self.locations(variable)?;
         match locations.get(index).copied() {
-            // The device reads attributes of 64 bits whole.
-            Some(place @ IoLocation::Location { .. }) if scalar.is_wide() && self.stage != Stage::Vertex => {
+            Some(place @ IoLocation::Location { .. }) if scalar.is_wide() => {
                 let words = place.words(scalar).into_iter();
                 let words: Vec<_> = words.map(|(word, numeric)| self.word(emit, word, numeric)).collect();
                 Ok(emit.op(Ir::Join64, &words))

@@ -182,6 +182,7 @@ fn execution_mode(globals: &Globals, instruction: &Instruction, interface: &mut 
             interface.workgroup_size = [constant(2)?, constant(3)?, constant(4)?];
         }
         ExecutionMode::EarlyFragmentTests => interface.early_fragment_tests = true,
+        ExecutionMode::PostDepthCoverage => interface.post_depth_coverage = true,
         ExecutionMode::DepthReplacing if interface.depth == DepthMode::NotWritten => {
             interface.depth = DepthMode::Replacing;
         }
@@ -256,6 +257,7 @@ fn empty_interface(stage: Stage) -> Interface {
         push_constants: None,
         workgroup_size: [1; 3],
         early_fragment_tests: false,
+        post_depth_coverage: false,
         depth: DepthMode::NotWritten,
         discards: false,
         per_sample: false,
@@ -408,6 +410,7 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::VulkanMemoryModelDeviceScope
             | C::DemoteToHelperInvocation
             | C::StencilExportEXT
+            | C::SampleMaskPostDepthCoverage
             | C::ShaderClockKHR
             | C::AtomicFloat32AddEXT
             | C::AtomicFloat32MinMaxEXT

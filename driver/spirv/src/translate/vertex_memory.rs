@@ -30,7 +30,7 @@ const MAX_ELEMENTS: usize = 16;
 /// The most vertices of a patch.
 const MAX_PATCH_VERTICES: u32 = 32;
 /// The most vertices that an invocation of a geometry stage emits.
-const MAX_EMITTED_VERTICES: u32 = 256;
+const MAX_EMITTED_VERTICES: u32 = 1024;
 /// The bytes of a word.
 const WORD_BYTES: u32 = 4;
 /// The bytes of an emitted vertex before its scalars.

@@ -61,8 +61,7 @@ fn attachments_are_resolved_aspect_by_aspect() {
             depth: None,
             stencil: Some(ResolveMode::Max),
         }),
-        input: Vec::new(),
-        view_mask: 0,
+        ..Subpass::default()
     };
     let packet = begun(views.clone(), vec![subpass]).subpass(0).unwrap();
     let found = rendering(packet);
@@ -96,6 +95,7 @@ fn attachments_have_as_many_samples_as_one_another() {
         store: vk::AttachmentStoreOp::STORE,
         clear_value: vk::ClearValue::default(),
         resolve: None,
+        mode: None,
     };
     let two = |samples: [u32; 2]| {
         let dynamic = DynamicRendering {
@@ -137,6 +137,7 @@ fn suspended_rendering_is_resolved_where_it_ends() {
         store: vk::AttachmentStoreOp::DONT_CARE,
         clear_value: vk::ClearValue::default(),
         resolve: Some(ResolveTo { target: view(COLOR, 1), mode: ResolveMode::Average }),
+        mode: None,
     };
     let resolves = |flags| {
         let dynamic =

@@ -247,15 +247,17 @@ fn packets(state: &mut State, parameters: &DrawParameters, draw_index: u32) -> R
         PipelineKind::Gaussian(gaussian) => {
             let begin = gaussian::begin(state, gaussian)?;
             let append = gaussian::append(state, &pipeline, gaussian, &begin.set, parameters, draw_index)?;
+            // A set has one fragment in a pixel, which may read what earlier draws have left there.
+            let mut packets = Vec::from_iter(gaussian.fixed.draw.reads_attachments.then_some(Packet::Barrier));
             let Some(set) = &mut state.gaussian_set else {
-                let mut packets = begin.packets();
+                packets.extend(begin.packets());
                 packets.extend([append, Packet::GaussianEnd]);
                 return Ok(packets);
             };
             match &set.first {
                 None => {
                     set.first = Some((Arc::clone(&pipeline), Box::new(begin.set.clone())));
-                    let mut packets = begin.packets();
+                    packets.extend(begin.packets());
                     packets.push(append);
                     Ok(packets)
                 }

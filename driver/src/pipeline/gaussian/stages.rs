@@ -55,7 +55,7 @@ impl VertexProjection {
         let attributes = stages::attributes(&graphics.vertex_input.input, &locations)?;
         let resources = ProgramResources::new(device, &vertex.interface);
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
-        let programs = link::link_projection(vertex, stream, &components)?;
+        let programs = link::link_projection(vertex, stream, &components);
         let programs = DrawPipeline::of_gaussians(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Self { programs: Arc::new(programs), attributes, resources })
@@ -140,6 +140,7 @@ impl ResolveStage {
             inputs: (0..4).map(input).collect(),
             outputs: (0..4).map(output).collect(),
             early_tests: false,
+            post_depth_coverage: false,
             discards: false,
             per_sample: false,
             has_side_effects: false,

@@ -71,6 +71,7 @@ pub fn fragment(interpolation: &[Interpolation]) -> FragmentPrograms {
         inputs: inputs.collect(),
         outputs: Vec::new(),
         early_tests: false,
+        post_depth_coverage: false,
         discards: false,
         per_sample: false,
         has_side_effects: false,

@@ -15,16 +15,19 @@ fn corners(draw: &Found, number: usize) -> Vec<[i32; 2]> {
 #[gaurast_runner::test]
 fn points_are_squares_of_their_size() {
     let device = device(1);
-    let positions = [at_pixel(50.0, 40.0, 0.5); 5];
-    let sizes = [[4.0f32], [0.25], [1000.0], [f32::NAN], [2.5]].map(|[size]| [size, 0.0, 0.0, 0.0]);
+    let positions = [at_pixel(50.5, 40.5, 0.5); 7];
+    // A point without a size, or a negative one, covers nothing.
+    let sizes = [0.0f32, 4.0, 0.25, 1000.0, -1.0, f32::NAN, 2.5].map(|size| [size, 0.0, 0.0, 0.0]);
     let programs = programs(&[VertexOutput::PointSize]);
     let mut draw = draw_with(&device, programs, state(Topology::PointList), &positions);
     draw.attributes.push(stream(&sizes, crate::Format::R32G32B32A32Sfloat));
     let found = run(&device, &draw);
-    for (number, side) in [1024, 256, 255 * 256, 256, 640].into_iter().enumerate() {
+    let sides = [1024, 64, 255 * 256, 256, 640];
+    assert_eq!(found.primitives.len(), sides.len());
+    for (number, side) in sides.into_iter().enumerate() {
         let primitive = &found.primitives[number];
         assert_eq!(primitive.kind, PrimitiveKind::Point);
-        let (x, y) = (50 * 256 - side / 2, 40 * 256 - side / 2);
+        let (x, y) = (50 * 256 + 128 - side / 2, 40 * 256 + 128 - side / 2);
         assert_eq!(primitive.corners, [[x, y], [x + side, y], [x + side, y + side]]);
         assert_eq!(primitive.vertices, [primitive.provoking; 3]);
     }

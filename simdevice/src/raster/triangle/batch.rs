@@ -96,6 +96,9 @@ pub struct Batch {
     /// True if 1 / w is constant in each primitive, so that barycentrics need no perspective correction.
     affine: bool,
     pub quads: [Quad; QUADS],
+    /// The sample masks that fragments of several samples read, for each quad: as [`Quad::cover`], before or after early
+    /// tests.
+    pub read_masks: [u16; QUADS],
     pub count: usize,
     /// A bit for each lane: 1 if it has a covered sample.
     covered: [u64; LANES / 64],
@@ -124,6 +127,7 @@ impl Default for Batch {
             side: 1,
             affine: true,
             quads: [Quad::default(); QUADS],
+            read_masks: [0; QUADS],
             count: 0,
             covered: [0; LANES / 64],
             tiles: 0,
@@ -748,7 +752,8 @@ impl Batch {
                 FragmentInput::SampleId => sample as u32,
                 FragmentInput::SamplePosition(axis) => within[axis.min(1)].to_bits(),
                 FragmentInput::SampleMask => {
-                    let cover = quad.cover >> (number % 4);
+                    let read = self.read_masks[4 * chunk + number / 4];
+                    let cover = if samples.positions.len() == 1 { quad.cover } else { read } >> (number % 4);
                     (0..4).map(|s| u32::from(cover >> (4 * s) & 1) << s).sum()
                 }
                 FragmentInput::Layer => record.layer.into(),

@@ -103,6 +103,7 @@ impl<'a> TriangleTileDraw<'a> {
             && !effects.removes
             && !state.alpha_to_one
             && state.line_mode != LineMode::Smooth
+            && !state.reads_attachments
             // A recording describes hardware that processes quads.
             && draw.record.is_none();
         let path = match interface {
@@ -134,6 +135,18 @@ impl<'a> TriangleTileDraw<'a> {
             level: runtime.level(),
             limit: runtime.config().shader_timeout,
         }
+    }
+
+    /// True if fragments read the samples that their primitive covers, of which early tests may remove some.
+    pub(super) fn reads_samples_before_tests(&self) -> bool {
+        let reads = |stage: &FragmentStage| {
+            let mut inputs = stage.interface.inputs.iter();
+            !stage.interface.post_depth_coverage && inputs.any(|(_, input, _)| *input == FragmentInput::SampleMask)
+        };
+        self.early.is_some()
+            && self.samples.positions.len() > 1
+            && !self.samples.each_shaded
+            && self.stage.is_some_and(reads)
     }
 
     /// True if all covered samples are written.

@@ -72,6 +72,7 @@ pub fn render(
         cancel,
         samples_passed: 0,
         quads_masked: 0,
+        before_tests: draw.reads_samples_before_tests().then_some([0; 4]),
         work: record.map(|_| MacroTileWork::default()),
     };
     renderer.batch.begin(draw.needs, macro_tile.at, macro_tile.size);
@@ -112,6 +113,8 @@ pub(super) struct Renderer<'a, 'd> {
     pub samples_passed: u64,
     /// The number of quads that were not shaded, because they have no sample left.
     pub quads_masked: u64,
+    /// The lanes of each sample of the current block before early tests, if fragments read them.
+    before_tests: Option<[u16; 4]>,
     /// The work in each tile, if there is a recorder.
     pub work: Option<MacroTileWork>,
 }
@@ -148,6 +151,13 @@ struct RasterPrimitive<'p> {
     /// The primitive's slot among deferred primitives, if a tile is deferred for it.
     slot: Option<u8>,
     range: (f32, f32),
+}
+
+/// The samples of quad `number` of a block, as [`Quad::cover`] has them, of the lanes of each sample of the block.
+#[inline(always)]
+fn quad_samples(lanes: &[u16], number: usize) -> u16 {
+    let samples = lanes.iter().enumerate();
+    samples.fold(0, |all, (sample, lanes)| all | (lanes >> (4 * number) & 15) << (4 * sample))
 }
 
 impl Renderer<'_, '_> {
@@ -202,7 +212,13 @@ impl Renderer<'_, '_> {
                     range: self.depth_range(primitive),
                 };
                 let corner = [whole.x, whole.y];
+                if draw.draw.state.reads_attachments {
+                    self.write_through(setup.bounds);
+                }
                 self.primitive(simd, &mut raster, &mut coverage, deferred, corner)?;
+                if draw.draw.state.reads_attachments {
+                    self.flush()?;
+                }
             }
         }
         if N == 1 && matches!(draw.path, Path::Deferred { .. }) {
@@ -211,6 +227,16 @@ impl Renderer<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Writes the tiles within `bounds` to the attachments' memory, where fragments read them.
+    fn write_through(&mut self, bounds: Rect) {
+        let MacroTile { layer, at, size } = self.macro_tile;
+        for tile in Tile::of_macro_tile(size, at, self.draw.area) {
+            if !tile.pixels.intersect(bounds).is_empty() {
+                self.buffers.write_through(self.draw.targets, layer, &tile);
+            }
+        }
     }
 
     /// The range to which a primitive's depth is clamped.
@@ -357,6 +383,9 @@ impl Renderer<'_, '_> {
                     }
                 }
             }
+            if let Some(before) = &mut self.before_tests {
+                before[..N].copy_from_slice(&lanes);
+            }
             let setup = raster.setup;
             let [x, y] = block_corner(tile.corner, block);
             let bases = setup.barycentrics(x, y);
@@ -464,10 +493,7 @@ impl Renderer<'_, '_> {
     ) -> Result<(), Stopped> {
         let skips_masked = self.draw.optimizations.has(Optimization::MaskedQuads);
         for number in 0..4 {
-            let mut cover = 0;
-            for (sample, lanes) in lanes.iter().enumerate() {
-                cover |= (lanes >> (4 * number) & 15) << (4 * sample);
-            }
+            let cover = quad_samples(lanes, number);
             if cover == 0 && (skips_masked || self.draw.samples.each_shaded) {
                 self.quads_masked += 1;
                 continue;
@@ -481,6 +507,10 @@ impl Renderer<'_, '_> {
                 None => self.record(raster),
             };
             let quad = Quad { place: quad.place + 4 * number as u8, record, cover, ..quad };
+            self.batch.read_masks[self.batch.count] = match &self.before_tests {
+                Some(before) => quad_samples(before, number),
+                None => cover,
+            };
             self.batch.add(quad, number, values);
         }
         Ok(())

@@ -54,6 +54,7 @@ pub fn programs() -> DrawPrograms {
             inputs: inputs.collect(),
             outputs: outputs.collect(),
             early_tests: false,
+            post_depth_coverage: false,
             discards: false,
             per_sample: false,
             has_side_effects: false,

@@ -276,6 +276,7 @@ impl Scene {
             load: LoadOp::Load,
             store: StoreOp::Store,
             resolve: None,
+            multisampled: None,
         };
         let has_stencil = self.depth.plane(Aspect::Stencil).is_some();
         let mut pass = Pass::begin(&Rendering {

@@ -69,7 +69,13 @@ fn texel(view: &ImageView, aspect: Aspect, layer: u32, sample: u32, [x, y]: [u32
 }
 
 fn attachment(view: &ImageView, value: ClearValue) -> Attachment {
-    Attachment { view: view.clone(), load: LoadOp::Clear(value), store: StoreOp::Store, resolve: None }
+    Attachment {
+        view: view.clone(),
+        load: LoadOp::Clear(value),
+        store: StoreOp::Store,
+        resolve: None,
+        multisampled: None,
+    }
 }
 
 fn state(samples: u32) -> DrawState {
@@ -102,6 +108,7 @@ fn fragments(inputs: Vec<FragmentInput>, outputs: Vec<FragmentOutput>, discards:
         inputs: inputs.into_iter().map(Some).collect(),
         outputs: outputs.into_iter().map(Some).collect(),
         early_tests: false,
+        post_depth_coverage: false,
         discards,
         per_sample: false,
         has_side_effects: false,

@@ -153,6 +153,7 @@ fn counting() -> FragmentPrograms {
         inputs: Vec::new(),
         outputs: Vec::new(),
         early_tests: false,
+        post_depth_coverage: false,
         discards: false,
         per_sample: false,
         has_side_effects: true,
