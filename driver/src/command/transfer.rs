@@ -644,11 +644,11 @@ struct CopySide<'a> {
     rules: &'a ImageRules,
 }
 
+/// The subresources on both sides of a copy.
+type LayerPair = (SubresourceLayers, SubresourceLayers);
+
 /// The planes and the subresources on both sides of a copy, aspect by aspect.
-fn layer_pairs(
-    source: &CopySide<'_>,
-    target: &CopySide<'_>,
-) -> Result<([usize; 2], Vec<(SubresourceLayers, SubresourceLayers)>), Error> {
+fn layer_pairs(source: &CopySide<'_>, target: &CopySide<'_>) -> Result<([usize; 2], Vec<LayerPair>), Error> {
     let (source_plane, sources) = aspect_layers(source.image, &source.layers, source.rules)?;
     let (target_plane, targets) = aspect_layers(target.image, &target.layers, target.rules)?;
     if sources.len() != targets.len() {

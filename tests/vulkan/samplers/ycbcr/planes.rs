@@ -40,7 +40,7 @@ fn parts_of_planes_are_copied_by_buffers() {
         to.upload(&Picture::random(plan, &mut noise));
         let mut expected = to.download();
         let buffer = Buffer::new(gpu, 4096);
-        for number in 0..plan.arrangement.planes() {
+        for (number, expected) in expected.iter_mut().enumerate() {
             let region = |x: i32, y: i32| {
                 vk::BufferImageCopy::default()
                     .buffer_offset(1024 * number as u64)
@@ -57,7 +57,7 @@ fn parts_of_planes_are_copied_by_buffers() {
             for y in 0..2 {
                 let at = |x: usize, y: usize| (y * width as usize + x) * texel;
                 let row = &bytes[at(2, 1 + y)..][..4 * texel];
-                expected[number][at(4, 2 + y)..][..4 * texel].copy_from_slice(row);
+                expected[at(4, 2 + y)..][..4 * texel].copy_from_slice(row);
             }
         }
         assert_eq!(to.download(), expected, "{:?}", plan.format);
@@ -260,13 +260,15 @@ fn what_cannot_be_is_refused() {
             .samples(vk::SampleCountFlags::TYPE_1)
             .usage(Usage::SAMPLED);
         // SAFETY: nothing is created.
-        assert!(unsafe { device.create_image(&info, None) }.is_err());
+        let made = unsafe { device.create_image(&info, None) };
+        assert!(made.is_err());
     };
     assert_eq!(refusal(gpu, || odd([5, 4])), "VUID-VkImageCreateInfo-format-04712");
     assert_eq!(refusal(gpu, || odd([4, 5])), "VUID-VkImageCreateInfo-format-04713");
     let view = |format, aspect| {
         // SAFETY: nothing is created.
-        assert!(unsafe { device.create_image_view(&image.view_info(format, aspect), None) }.is_err());
+        let made = unsafe { device.create_image_view(&image.view_info(format, aspect), None) };
+        assert!(made.is_err());
     };
     let (color, second) = (vk::ImageAspectFlags::COLOR, vk::ImageAspectFlags::PLANE_1);
     assert_eq!(refusal(gpu, || view(format, color)), "VUID-VkImageViewCreateInfo-format-06415");
@@ -298,5 +300,6 @@ fn what_cannot_be_is_refused() {
         });
         assert!(recorded.is_err());
     };
-    assert_eq!(refusal(gpu, commands), "VUID-vkCmdClearColorImage-image-01545");
+    // The recording says it, and its end.
+    assert_eq!(refusal(gpu, commands), ["VUID-vkCmdClearColorImage-image-01545"; 2].join(" "));
 }
