@@ -416,13 +416,16 @@ mod tests {
             count::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(),
             count::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceMultisampledRenderToSingleSampledFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceYcbcr2Plane444FormatsFeaturesEXT<'_>>(),
             count::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(),
         ];
         assert_eq!(
             counts,
             [
                 44, 10, 43, 14, 1, 1, 1, 2, 3, 1, 1, 3, 1, 2, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1, 16, 6,
-                1, 2, 1, 30
+                1, 2, 1, 3, 1, 1, 30
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

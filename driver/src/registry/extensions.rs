@@ -31,7 +31,6 @@ pub(crate) const INSTANCE: &[Extension] = &[
 pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_GAURAST_gaussian_primitive_topology", 3),
     (c"VK_AMD_shader_early_and_late_fragment_tests", 1),
-    (c"VK_ARM_rasterization_order_attachment_access", 1),
     (c"VK_EXT_4444_formats", 1),
     (c"VK_EXT_attachment_feedback_loop_layout", 2),
     (c"VK_EXT_border_color_swizzle", 1),

@@ -496,6 +496,9 @@ impl SegmentSetup<'_> {
     pub(super) fn push_point(&mut self, primitive: &AssembledPrimitive, vertex: CornerVertex, size: f32, bias: f32) {
         let size = if size.is_nan() { 1.0 } else { size.clamp(0.0, MAX_POINT_SIZE) };
         let side = snap_length(size);
+        if side == 0 {
+            return;
+        }
         let [x, y] = vertex.window_vertex.window.map(|at| snap_away(at) - side / 2);
         let corners = [[x, y], [x + side, y], [x + side, y + side]];
         if let Some(pixels) = self.pixels(primitive, &corners) {

@@ -157,10 +157,10 @@ fn attributes_are_of_the_kinds_that_the_shader_reads() {
 }
 
 #[gaurast_runner::test]
-fn attributes_of_64_bits_are_refused() {
+fn inputs_of_64_bits_need_attributes_of_64_bits() {
     let gpu = open();
     let request = Graphics { shaders: vec![Shader::vertex(spirv("double_attribute.vert"))], ..colored() };
-    assert_refused(&gpu, &request, USAGE, "width: 64");
+    assert_refused(&gpu, &request, USAGE, "location 0");
     let outputs = Graphics { shaders: vec![Shader::vertex(spirv("doubles.vert"))], ..colored() };
     assert_made(&gpu, &outputs);
 }
