@@ -33,6 +33,8 @@ pub(crate) fn check(
             id,
             format!("format is {:?}, but must have 3 components or more that are no integers", bound.format),
         );
+    } else if format.word_bytes() > 4 {
+        faults.error(id, format!("format is {:?}, whose components have more than 32 bits", bound.format));
     } else if !is_vertex_format(bound.format) {
         faults.error(
             id,
