@@ -92,8 +92,9 @@ async function composited(name, env, args) {
     await page.goto('chrome://gpu');
     const status = await page.evaluate(async () => {
         // The text is in shadow trees, and comes after a while.
-        const texts = (node) => [node, ...(node.shadowRoot ? texts(node.shadowRoot) : [])].flatMap((root) =>
-            [...root.childNodes].flatMap((child) => (child.nodeType === Node.TEXT_NODE ? [child.textContent.trim()] : texts(child))));
+        const texts = (node) => (node.nodeType === Node.TEXT_NODE
+            ? [node.textContent.trim()]
+            : [node.shadowRoot, ...node.childNodes].filter((child) => child).flatMap(texts));
         for (let wait = 0; wait < 100; wait += 1) {
             const text = texts(document.body).filter((line) => line).join('\n');
             if (text.includes('Compositing:')) return text;
