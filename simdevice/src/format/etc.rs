@@ -85,7 +85,7 @@ fn opaque(base: Rgb, distance: i32) -> [u8; 4] {
     [r, g, b, u8::MAX]
 }
 
-/// How the texels of a block of colours are stored.
+/// The coding of the texels of a block of colours.
 #[derive(Clone, Copy, Debug)]
 enum Colors {
     /// A palette for each half of the block. The halves lie beside each other, or one upon the other if `is_flipped`.

@@ -18,7 +18,7 @@ const COLOR: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT_S8_UINT;
 const TRIANGLES: u32 = 40;
 
-/// What a fragment reads.
+/// The attachment that a fragment reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Read {
     Color,

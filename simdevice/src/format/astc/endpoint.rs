@@ -9,7 +9,7 @@ pub(super) const MAX_VALUES: usize = 18;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Endpoints([[u8; 4]; 2]);
 
-/// How the components of endpoints become 16 bits.
+/// The expansion of the components of endpoints to 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Expansion {
     /// The byte twice.

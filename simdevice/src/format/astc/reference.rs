@@ -2,7 +2,7 @@
 
 use super::Texel;
 
-/// What a texel is: the components of 16 bits, or the error colour.
+/// A texel: the components of 16 bits, or the error colour.
 pub(super) type Result = std::result::Result<Texel, &'static str>;
 
 /// Bits `low` to `high` of a number.
