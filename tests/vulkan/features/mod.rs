@@ -3,4 +3,6 @@
 //! Unit tests: `driver/src/physical_device`, `driver/src/registry`.
 
 mod limits;
+mod maintenance;
+mod newer_names;
 mod robust_access;

@@ -4,4 +4,5 @@
 
 mod device_memory;
 mod extended_usage;
+mod hints;
 mod linear_images;
