@@ -6,8 +6,8 @@ use ash::vk;
 use simdevice::Format;
 use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
 use simdevice::state::{
-    BlendEquation, BlendEquations, BlendFactor, BlendOp, CompareOp, LineMode, LogicOp, PolygonMode, Rect, ResolveMode,
-    StencilFace, StencilOp, Topology, Viewport,
+    BlendEquation, BlendEquations, BlendFactor, BlendOp, CompareOp, DepthBiasUnit, LineMode, LogicOp, PolygonMode,
+    Rect, ResolveMode, StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
     AddressMode, BorderColor, ChromaLocation, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
@@ -44,6 +44,27 @@ pub(crate) fn topology(topology: vk::PrimitiveTopology) -> Result<Topology, Erro
         T::TRIANGLE_STRIP_WITH_ADJACENCY => Ok(Topology::TriangleStripWithAdjacency),
         T::PATCH_LIST => Ok(Topology::PatchList { control_points: 0 }),
         other => Err(unknown("VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter", &other)),
+    }
+}
+
+/// The unit of a constant depth bias.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] for what is no representation.
+pub(crate) fn depth_bias_unit(info: Option<&vk::DepthBiasRepresentationInfoEXT<'_>>) -> Result<DepthBiasUnit, Error> {
+    use vk::DepthBiasRepresentationEXT as R;
+    let Some(info) = info else {
+        return Ok(DepthBiasUnit::DEFAULT);
+    };
+    let is_exact = info.depth_bias_exact != vk::FALSE;
+    match info.depth_bias_representation {
+        R::LEAST_REPRESENTABLE_VALUE_FORMAT => Ok(DepthBiasUnit::Format { is_exact }),
+        R::LEAST_REPRESENTABLE_VALUE_FORCE_UNORM => Ok(DepthBiasUnit::FixedPoint { is_exact }),
+        R::FLOAT => Ok(DepthBiasUnit::One),
+        other => Err(Error::usage(
+            "VUID-VkDepthBiasRepresentationInfoEXT-depthBiasRepresentation-parameter",
+            format!("{other:?} is no representation of depth bias"),
+        )),
     }
 }
 

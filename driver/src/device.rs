@@ -10,7 +10,7 @@ use crate::enabled::Enabled;
 use crate::instance::{EnabledExtensions, Instance, PhysicalDevice, resolve_extensions};
 use crate::options::{self, Dump};
 use crate::physical_device::memory::{self, Heap};
-use crate::physical_device::{QUEUE_COUNT, QUEUE_FAMILIES};
+use crate::physical_device::{GLOBAL_PRIORITY, QUEUE_COUNT, QUEUE_FAMILIES};
 use crate::queue::Queue;
 use crate::registry;
 use crate::registry::features::Features;
@@ -207,6 +207,16 @@ unsafe fn queue_families(info: &vk::DeviceCreateInfo<'_>) -> Result<Vec<u32>, Er
                 family.queue_count,
                 family.queue_family_index,
                 QUEUE_FAMILIES.len()
+            )));
+        }
+        // SAFETY: the caller promises a valid creation info.
+        let priority = unsafe { valid::find_in_chain::<vk::DeviceQueueGlobalPriorityCreateInfoKHR<'_>>(family.p_next) };
+        if let Some(given) = priority
+            && given.global_priority != GLOBAL_PRIORITY
+        {
+            return Err(Error::InitializationFailed(format!(
+                "queues of the global priority {:?} were asked for; there are those of {GLOBAL_PRIORITY:?} only",
+                given.global_priority
             )));
         }
         queues.extend((0..family.queue_count).map(|_| family.queue_family_index));

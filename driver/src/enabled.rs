@@ -6,7 +6,7 @@
 use crate::abi::error::Error;
 use crate::abi::handle::Reporter;
 use crate::abi::valid;
-use crate::registry::features::{Features, SUPPORTED, extension_of};
+use crate::registry::features::{Features, SUPPORTED, extensions_of};
 use ash::vk;
 use std::collections::HashSet;
 use std::ffi::CStr;
@@ -99,11 +99,12 @@ impl Enabled {
         Ok(())
     }
 
-    /// Requires the extension of a structure of features, if one of them is asked for.
+    /// Requires an extension of a structure of features, if one of them is asked for.
     fn require_extension(&self, structure: &vk::BaseInStructure<'_>) -> Result<(), Error> {
-        let Some(needed) = extension_of(structure.s_type).filter(|name| !self.extensions.contains(name)) else {
+        let needed = extensions_of(structure.s_type);
+        if needed.is_empty() || needed.iter().any(|name| self.extensions.contains(name)) {
             return Ok(());
-        };
+        }
         let mut requested = Features::NONE;
         requested.add(structure);
         require_supported(&requested)?;
@@ -111,7 +112,10 @@ impl Enabled {
             None => Ok(()),
             Some((feature, _)) => self.tolerate(Error::usage(
                 "VUID-VkDeviceCreateInfo-pNext-pNext",
-                format!("the feature {feature} needs {needed:?}, which is not enabled"),
+                format!(
+                    "the feature {feature} needs {}, which is not enabled",
+                    needed.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(" or ")
+                ),
             )),
         }
     }

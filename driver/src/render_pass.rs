@@ -342,6 +342,7 @@ pub(crate) unsafe fn create_render_pass2(
 
 /// Returns a granularity of one pixel: no area is faster than another.
 #[doc(alias = "vkGetRenderAreaGranularity")]
+#[doc(alias = "vkGetRenderingAreaGranularityKHR")]
 pub(crate) fn get_render_area_granularity() -> Result<vk::Extent2D, Error> {
     Ok(vk::Extent2D { width: 1, height: 1 })
 }

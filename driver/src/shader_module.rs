@@ -224,10 +224,11 @@ unsafe fn module(device: &Device, info: &vk::PipelineShaderStageCreateInfo<'_>) 
         if let Some(module) = handle::get_optional(info.module)? {
             return Ok(Arc::clone(module));
         }
-        device.enabled().require(device.features().graphics_pipeline_library, || {
+        let features = device.features();
+        device.enabled().require(features.graphics_pipeline_library || features.maintenance5, || {
             Error::usage(
                 "VUID-VkPipelineShaderStageCreateInfo-stage-08771",
-                "module is VK_NULL_HANDLE, and graphicsPipelineLibrary is not enabled",
+                "module is VK_NULL_HANDLE, and neither graphicsPipelineLibrary nor maintenance5 is enabled",
             )
         })?;
         let code = valid::find_in_chain::<vk::ShaderModuleCreateInfo<'_>>(info.p_next);

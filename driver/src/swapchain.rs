@@ -13,7 +13,7 @@ use crate::device::Device;
 use crate::device_sync::{DeviceSync, WaitResult, deadline};
 use crate::queue::Queue;
 use crate::resource::image::{Image, bind_image_memory, check_instances, new_image};
-use crate::resource::memory::Memory;
+use crate::resource::memory::{Memory, bind_all};
 use crate::surface::Surface;
 use crate::sync::{Fence, Semaphore};
 use crate::window::{Canvas, PresentMode, WindowLost};
@@ -436,7 +436,7 @@ pub(crate) unsafe fn queue_present(queue: &Queue, present_info: &vk::PresentInfo
 /// The infos, their chains and their handles are valid.
 #[doc(alias = "vkBindImageMemory2")]
 pub(crate) unsafe fn bind_image_memory2(bind_infos: &[vk::BindImageMemoryInfo<'_>]) -> Result<(), Error> {
-    bind_infos.iter().try_for_each(|info| {
+    let bind = |info: &vk::BindImageMemoryInfo<'_>| {
         // SAFETY: the caller's promise.
         let (image, of_swapchain, plane) = unsafe {
             let of_swapchain = valid::find_in_chain::<vk::BindImageMemorySwapchainInfoKHR<'_>>(info.p_next);
@@ -468,7 +468,9 @@ pub(crate) unsafe fn bind_image_memory2(bind_infos: &[vk::BindImageMemoryInfo<'_
         // SAFETY: the caller's promise.
         let memory = unsafe { handle::get(info.memory)? };
         image.bind(memory.allocation(), info.memory_offset, plane.map(|info| info.plane_aspect))
-    })
+    };
+    // SAFETY: the caller's promise.
+    unsafe { bind_all(bind_infos, |info| info.p_next, bind) }
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Declarations of ash and of gaurast: the Rust names and types of the registry's structures and commands.
+//! Declarations of ash, of gaurast, and of the driver for what is newer than ash: the Rust names and types of the registry's structures and commands.
 
 use crate::error::Error;
 use crate::file::File;
@@ -9,7 +9,10 @@ use quote::ToTokens;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The declarations of both crates.
+/// The driver's declarations of structures that are newer than ash.
+const NEWER: &str = "driver/src/registry/newer.rs";
+
+/// All declarations.
 #[derive(Debug, Default)]
 pub struct Declarations {
     structures: HashMap<String, Structure>,
@@ -57,6 +60,7 @@ impl Declarations {
         for name in ["definitions.rs", "features.rs", "extensions.rs"] {
             declarations.add(rust::parse(&ash.join(name))?);
         }
+        declarations.add_newer(rust::parse(&root.join(NEWER))?);
         declarations
             .add(syn::parse_file(&gaurast.text).map_err(|source| Error::Rust { path: gaurast.path.into(), source })?);
         Ok(declarations)
@@ -64,6 +68,27 @@ impl Declarations {
 
     fn add(&mut self, file: syn::File) {
         file.items.into_iter().for_each(|item| self.add_item(item));
+    }
+
+    /// Adds declarations of the driver.
+    fn add_newer(&mut self, file: syn::File) {
+        let path = |name: &str| format!("crate::registry::newer::{name}");
+        for item in file.items {
+            match item {
+                syn::Item::Struct(item) => {
+                    let name = item.ident.to_string();
+                    let members = item.fields.into_iter().filter_map(member).collect();
+                    self.structures.insert(name.clone(), Structure { ty: path(&name), members });
+                }
+                syn::Item::Type(item) => {
+                    let name = item.ident.to_string();
+                    if let (Some(command), syn::Type::BareFn(function)) = (name.strip_prefix("PFN_"), *item.ty) {
+                        self.functions.insert(command.to_owned(), signature(path(&name), function));
+                    }
+                }
+                _ => {}
+            }
+        }
     }
 
     fn add_item(&mut self, item: syn::Item) {

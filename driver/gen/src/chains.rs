@@ -4,7 +4,6 @@ use crate::ash::{self, Declarations};
 use crate::error::Error;
 use crate::registry::{self, Registry};
 use crate::support::Support;
-use std::collections::HashSet;
 
 /// A structure of a chain.
 #[derive(Debug)]
@@ -15,8 +14,8 @@ pub(crate) struct Chained<'a> {
     pub(crate) structure: &'a registry::Structure,
     /// Its declaration, whose members are in the same order.
     pub(crate) declared: &'a ash::Structure,
-    /// The extension that adds it; None if the core version does.
-    pub(crate) extension: Option<&'a str>,
+    /// The extensions of which each adds it; none if the core version does.
+    pub(crate) extensions: Vec<&'a str>,
 }
 
 impl<'a> Chained<'a> {
@@ -25,7 +24,7 @@ impl<'a> Chained<'a> {
         registry: &'a Registry,
         declarations: &'a Declarations,
         name: &'a str,
-        extension: Option<&'a str>,
+        extensions: Vec<&'a str>,
     ) -> Result<Self, Error> {
         let name = registry.type_name(name);
         let structure = registry
@@ -36,7 +35,7 @@ impl<'a> Chained<'a> {
         if structure.members.len() != declared.members.len() {
             return Err(Error::Undeclared(format!("{name} with all its members")));
         }
-        Ok(Self { name, structure, declared, extension })
+        Ok(Self { name, structure, declared, extensions })
     }
 
     /// The structures that extend `base`: those of the core version, beginning with those that hold all of a version's,
@@ -62,20 +61,26 @@ impl<'a> Chained<'a> {
                 .flat_map(|requirement| &requirement.types)
                 .map(|name| (name, Some(extension.as_str())))
         });
-        let mut seen = HashSet::new();
-        let mut chained = Vec::new();
+        let mut chained: Vec<Self> = Vec::new();
         for (name, extension) in core.chain(listed) {
             let last = registry.type_name(name);
             let extends = registry
                 .structures
                 .get(last)
                 .is_some_and(|structure| structure.extends.iter().any(|name| name == base));
-            if extends && seen.insert(last) {
-                chained.push(Self::new(registry, declarations, name, extension)?);
+            if !extends {
+                continue;
+            }
+            match chained.iter_mut().find(|known| known.name == last) {
+                // A structure of the core version needs no extension.
+                Some(known) if known.extensions.is_empty() => {}
+                Some(known) => known.extensions.extend(extension.filter(|name| !known.extensions.contains(name))),
+                None => chained.push(Self::new(registry, declarations, name, extension.into_iter().collect())?),
             }
         }
-        chained
-            .sort_by_key(|chained| (chained.extension.is_some(), !chained.name.starts_with("VkPhysicalDeviceVulkan1")));
+        chained.sort_by_key(|chained| {
+            (!chained.extensions.is_empty(), !chained.name.starts_with("VkPhysicalDeviceVulkan1"))
+        });
         Ok(chained)
     }
 

@@ -18,7 +18,7 @@ pub(crate) fn structures<'a>(
     declarations: &'a Declarations,
     support: &'a Support,
 ) -> Result<Vec<Chained<'a>>, Error> {
-    let mut structures = vec![Chained::new(registry, declarations, CORE, None)?];
+    let mut structures = vec![Chained::new(registry, declarations, CORE, Vec::new())?];
     structures.extend(Chained::all(registry, declarations, support, "VkPhysicalDeviceFeatures2")?);
     Ok(structures)
 }
@@ -27,9 +27,13 @@ pub(crate) fn structures<'a>(
 fn supported<'a>(support: &'a Support, structures: &[Chained<'a>]) -> Result<BTreeSet<&'a str>, Error> {
     let mut supported = BTreeSet::new();
     let mut add = |owner: Option<&'a str>, names: Vec<&'a str>| {
+        let is_owned = |chained: &&Chained<'a>| match owner {
+            Some(owner) => chained.extensions.contains(&owner),
+            None => chained.extensions.is_empty(),
+        };
         let known: Vec<&str> = structures
             .iter()
-            .filter(|chained| chained.extension == owner)
+            .filter(is_owned)
             .flat_map(|chained| &chained.structure.members)
             .map(|member| member.name.as_str())
             .collect();
@@ -39,7 +43,8 @@ fn supported<'a>(support: &'a Support, structures: &[Chained<'a>]) -> Result<BTr
                 let owner = owner.unwrap_or("core");
                 return Err(Error::Support(format!("{owner} has no feature {name}")));
             }
-            if !supported.insert(name) {
+            // The extensions of one structure have the same features.
+            if !supported.insert(name) && owner.is_none() {
                 return Err(Error::Support(format!("{name} is there twice")));
             }
         }
@@ -63,10 +68,10 @@ pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &
     let mut table = Table::default();
     for chained in &structures {
         let ty = path(&chained.declared.ty);
-        let heading = match chained.extension {
-            None if chained.name == CORE => format!("core {ty}"),
-            None => format!("structure {ty}"),
-            Some(extension) => extension_heading(ty, extension),
+        let heading = match &chained.extensions[..] {
+            [] if chained.name == CORE => format!("core {ty}"),
+            [] => format!("structure {ty}"),
+            extensions => extension_heading(ty, extensions),
         };
         let rows = chained.members().map(|(member, declared)| {
             let name = member.name.as_str();
@@ -91,9 +96,10 @@ pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &
     )
 }
 
-/// The heading of a structure that an extension adds, on one line or on two.
-fn extension_heading(ty: &str, extension: &str) -> String {
-    let heading = format!("structure {ty}: c\"{extension}\"");
+/// The heading of a structure that each of some extensions adds, on one line or on two.
+fn extension_heading(ty: &str, extensions: &[&str]) -> String {
+    let names: Vec<String> = extensions.iter().map(|name| format!("c\"{name}\"")).collect();
+    let heading = format!("structure {ty}: {}", names.join(" | "));
     if "     {".len() + heading.len() <= MAX_WIDTH { heading } else { heading.replace(": ", ":\n        ") }
 }
 

@@ -43,7 +43,7 @@ pub(crate) fn field<'a>(structure: &str, member: &'a str) -> &'a str {
 pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &Support) -> Result<String, Error> {
     let mut holders = Vec::new();
     for (heading, name) in CORE {
-        holders.push((heading, Chained::new(registry, declarations, name, None)?));
+        holders.push((heading, Chained::new(registry, declarations, name, Vec::new())?));
     }
     let chained = structures(registry, declarations, support)?;
     holders.extend(chained.into_iter().map(|chained| ("structure", chained)));

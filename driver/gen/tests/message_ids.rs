@@ -13,9 +13,10 @@ fn main() -> std::process::ExitCode {
 const VALID_USAGE: &str = "/usr/share/vulkan/registry/validusage.json";
 
 /// Ids that the package's version, Vulkan 1.3.239, lacks, and that 1.3.281 has.
-const NEWER: [&str; 10] = [
+const NEWER: [&str; 11] = [
     "VUID-RuntimeSpirv-OpEntryPoint-08743",
     "VUID-VkComputePipelineCreateInfo-layout-07988",
+    "VUID-VkDepthBiasRepresentationInfoEXT-depthBiasRepresentation-parameter",
     "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
     "VUID-VkGraphicsPipelineCreateInfo-Input-08733",
     "VUID-VkGraphicsPipelineCreateInfo-layout-07988",

@@ -263,6 +263,14 @@ impl Globals {
                 }
                 bits
             }
+            Op::ConstantCompositeReplicateEXT | Op::SpecConstantCompositeReplicateEXT => {
+                let part = instruction.id(0)?;
+                let Some(part) = self.constants.get(&part) else {
+                    return malformed(format!("%{part} isn't a constant"));
+                };
+                let count = self.types.scalars(ty)? as usize;
+                part.bits.iter().copied().cycle().take(count).collect()
+            }
             Op::ConstantNull => vec![0; self.types.scalars(ty)? as usize],
             Op::Undef => vec![0; self.types.scalars(ty)? as usize],
             Op::SpecConstantOp => evaluate(self, ty, &instruction.numbers(0))?,

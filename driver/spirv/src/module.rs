@@ -2,7 +2,9 @@
 
 use std::collections::HashMap;
 
-use spirv::{BuiltIn, Capability, Decoration, ExecutionModel, FPRoundingMode, MemoryAccess, MemoryModel, Op};
+use spirv::{
+    BuiltIn, Capability, Decoration, ExecutionModel, FPFastMathMode, FPRoundingMode, MemoryAccess, MemoryModel, Op,
+};
 
 use super::decoder::{HEADER_WORDS, decode};
 use super::error::Error;
@@ -89,7 +91,7 @@ impl Loader {
             | Op::Line
             | Op::NoLine => {}
             // Debug information.
-            Op::ExtInst if self.function.is_none() => {}
+            Op::ExtInst | Op::ExtInstWithForwardRefsKHR if self.function.is_none() => {}
             op if op.is_annotation() => sections.annotations.push(instruction),
             op if op.is_type() || op.is_constant() => sections.globals.push(instruction),
             Op::Variable | Op::Undef if self.function.is_none() => sections.globals.push(instruction),
@@ -276,6 +278,11 @@ impl Module {
     pub(crate) fn rounds_towards_zero(&self, id: u32) -> bool {
         let mode = self.decorations.get(&id).and_then(|all| enumerant(all, Decoration::FPRoundingMode));
         mode.and_then(FPRoundingMode::from_u32) == Some(FPRoundingMode::RTZ)
+    }
+
+    /// The bits of the fast-math mode that a result is decorated with.
+    pub(crate) fn fast_math(&self, id: u32) -> Option<FPFastMathMode> {
+        enumerant(self.decorations.get(&id)?, Decoration::FPFastMathMode).map(FPFastMathMode::from_bits_truncate)
     }
 
     /// Reports whether a struct's member has a decoration.

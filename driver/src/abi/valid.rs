@@ -248,7 +248,7 @@ impl ChainedOutput<'_> {
 ///
 /// # Safety
 /// `first` is null or begins a valid chain that nothing else uses during the call.
-unsafe fn for_each_output(first: *mut c_void, mut visit: impl FnMut(ChainedOutput<'_>)) {
+pub(crate) unsafe fn for_each_output(first: *mut c_void, mut visit: impl FnMut(ChainedOutput<'_>)) {
     let mut next = first.cast::<vk::BaseOutStructure<'_>>();
     while !next.is_null() {
         // SAFETY: the caller's promise; every structure of a chain begins like `VkBaseOutStructure`.

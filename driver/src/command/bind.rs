@@ -114,11 +114,23 @@ pub(crate) fn cmd_set_vertex_input(
     Ok(())
 }
 
+/// Binds indices; those of a null buffer are zero.
 #[doc(alias = "vkCmdBindIndexBuffer")]
 pub(crate) fn cmd_bind_index_buffer(
     recorder: &mut Recorder,
-    buffer: &Arc<Buffer>,
+    buffer: Option<&Arc<Buffer>>,
     offset: vk::DeviceSize,
+    index_type: vk::IndexType,
+) -> Result<(), Error> {
+    cmd_bind_index_buffer2(recorder, buffer, offset, vk::WHOLE_SIZE, index_type)
+}
+
+#[doc(alias = "vkCmdBindIndexBuffer2KHR")]
+pub(crate) fn cmd_bind_index_buffer2(
+    recorder: &mut Recorder,
+    buffer: Option<&Arc<Buffer>>,
+    offset: vk::DeviceSize,
+    size: vk::DeviceSize,
     index_type: vk::IndexType,
 ) -> Result<(), Error> {
     let index_size = match index_type {
@@ -129,8 +141,20 @@ pub(crate) fn cmd_bind_index_buffer(
             return Err(Error::FeatureNotPresent(format!("index type {other:?}")));
         }
     };
-    let range = buffer.range(offset, None, &INDEX_BUFFER)?;
-    recorder.push(Command::BindIndexBuffer(IndexBuffer { range, index_size }));
+    let range = match buffer {
+        Some(buffer) => buffer.range(offset, (size != vk::WHOLE_SIZE).then_some(size), &INDEX_BUFFER)?,
+        None => nothing()?,
+    };
+    recorder.push(Command::BindIndexBuffer(IndexBuffer { range, index_size, restart: None }));
+    Ok(())
+}
+
+#[doc(alias = "vkCmdSetPrimitiveRestartIndexEXT")]
+pub(crate) fn cmd_set_primitive_restart_index(
+    recorder: &mut Recorder,
+    primitive_restart_index: u32,
+) -> Result<(), Error> {
+    recorder.push(Command::SetPrimitiveRestartIndex(primitive_restart_index));
     Ok(())
 }
 
@@ -209,7 +233,33 @@ pub(crate) fn cmd_bind_descriptor_sets(
     Ok(())
 }
 
+/// Binds sets at each bind point that has one of the stages.
+#[doc(alias = "vkCmdBindDescriptorSets2KHR")]
+pub(crate) fn cmd_bind_descriptor_sets2(
+    recorder: &mut Recorder,
+    stage_flags: vk::ShaderStageFlags,
+    layout: &PipelineLayout,
+    first_set: u32,
+    descriptor_sets: Handles<'_, vk::DescriptorSet>,
+    dynamic_offsets: &[u32],
+) -> Result<(), Error> {
+    for bind_point in bind_points(stage_flags) {
+        cmd_bind_descriptor_sets(recorder, bind_point, layout, first_set, descriptor_sets, dynamic_offsets)?;
+    }
+    Ok(())
+}
+
+/// The bind points of stages.
+fn bind_points(stages: vk::ShaderStageFlags) -> impl Iterator<Item = vk::PipelineBindPoint> {
+    let of_each = [
+        (vk::ShaderStageFlags::ALL_GRAPHICS, vk::PipelineBindPoint::GRAPHICS),
+        (vk::ShaderStageFlags::COMPUTE, vk::PipelineBindPoint::COMPUTE),
+    ];
+    of_each.into_iter().filter(move |(own, _)| stages.intersects(*own)).map(|(_, point)| point)
+}
+
 #[doc(alias = "vkCmdPushConstants")]
+#[doc(alias = "vkCmdPushConstants2KHR")]
 pub(crate) fn cmd_push_constants(
     recorder: &mut Recorder,
     _layout: &PipelineLayout,
@@ -253,9 +303,28 @@ pub(crate) unsafe fn cmd_push_descriptor_set(
     Ok(())
 }
 
+/// Pushes descriptors at each bind point that has one of the stages.
+///
+/// # Safety
+/// The writes, their chains and their handles are valid.
+#[doc(alias = "vkCmdPushDescriptorSet2KHR")]
+pub(crate) unsafe fn cmd_push_descriptor_set2(
+    recorder: &mut Recorder,
+    stage_flags: vk::ShaderStageFlags,
+    layout: &PipelineLayout,
+    set: u32,
+    descriptor_writes: &[vk::WriteDescriptorSet<'_>],
+) -> Result<(), Error> {
+    bind_points(stage_flags).try_for_each(|bind_point| {
+        // SAFETY: the caller's promise.
+        unsafe { cmd_push_descriptor_set(recorder, bind_point, layout, set, descriptor_writes) }
+    })
+}
+
 /// # Safety
 /// The data is what the template describes, and its handles are live.
 #[doc(alias = "vkCmdPushDescriptorSetWithTemplateKHR")]
+#[doc(alias = "vkCmdPushDescriptorSetWithTemplate2KHR")]
 pub(crate) unsafe fn cmd_push_descriptor_set_with_template(
     recorder: &mut Recorder,
     descriptor_update_template: &UpdateTemplate,

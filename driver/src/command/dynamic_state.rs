@@ -9,7 +9,7 @@ use crate::physical_device::limits;
 use crate::pipeline::dynamic_state::{DynamicState, Face, faces};
 use ash::vk;
 use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
-use simdevice::state::{DepthBias, LineStipple};
+use simdevice::state::{DepthBias, DepthBiasUnit, LineStipple};
 
 /// Records a state.
 ///
@@ -40,8 +40,27 @@ pub(crate) fn cmd_set_depth_bias(
     depth_bias_clamp: f32,
     depth_bias_slope_factor: f32,
 ) -> Result<(), Error> {
-    let bias =
-        DepthBias { constant: depth_bias_constant_factor, clamp: depth_bias_clamp, slope: depth_bias_slope_factor };
+    let bias = DepthBias {
+        constant: depth_bias_constant_factor,
+        unit: DepthBiasUnit::DEFAULT,
+        clamp: depth_bias_clamp,
+        slope: depth_bias_slope_factor,
+    };
+    set(recorder, DynamicState::DepthBias { bias })
+}
+
+#[doc(alias = "vkCmdSetDepthBias2EXT")]
+pub(crate) fn cmd_set_depth_bias2(
+    recorder: &mut Recorder,
+    depth_bias_info: &vk::DepthBiasInfoEXT<'_>,
+    representation: Option<&vk::DepthBiasRepresentationInfoEXT<'_>>,
+) -> Result<(), Error> {
+    let bias = DepthBias {
+        constant: depth_bias_info.depth_bias_constant_factor,
+        unit: convert::depth_bias_unit(representation)?,
+        clamp: depth_bias_info.depth_bias_clamp,
+        slope: depth_bias_info.depth_bias_slope_factor,
+    };
     set(recorder, DynamicState::DepthBias { bias })
 }
 

@@ -150,6 +150,8 @@ pub(crate) enum Command {
     },
     /// `vkCmdBindIndexBuffer`.
     BindIndexBuffer(IndexBuffer),
+    /// `vkCmdSetPrimitiveRestartIndexEXT`.
+    SetPrimitiveRestartIndex(u32),
     /// `vkCmdSetViewport` and `vkCmdSetViewportWithCount`, for each viewport.
     SetViewport {
         /// The viewport's number.
@@ -292,6 +294,8 @@ pub(crate) struct IndexBuffer {
     pub(crate) range: BufferRange,
     /// Bytes per index: 1, 2 or 4.
     pub(crate) index_size: u32,
+    /// The index that restarts a primitive, if it isn't the greatest.
+    pub(crate) restart: Option<u32>,
 }
 
 /// A draw's parameters.

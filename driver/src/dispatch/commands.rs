@@ -262,6 +262,9 @@ static ROWS: &[Command] = rows! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable;
     }
+    Device, DeviceExtension(&[c"VK_EXT_attachment_feedback_loop_dynamic_state"]) => {
+        vkCmdSetAttachmentFeedbackLoopEnableEXT: vk::PFN_vkCmdSetAttachmentFeedbackLoopEnableEXT;
+    }
     PhysicalDevice, DeviceExtension(&[c"VK_EXT_calibrated_timestamps"]) => {
         vkGetPhysicalDeviceCalibrateableTimeDomainsEXT: vk::PFN_vkGetPhysicalDeviceCalibrateableTimeDomainsKHR;
     }
@@ -274,6 +277,13 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_EXT_conditional_rendering"]) => {
         vkCmdBeginConditionalRenderingEXT: vk::PFN_vkCmdBeginConditionalRenderingEXT;
         vkCmdEndConditionalRenderingEXT: vk::PFN_vkCmdEndConditionalRenderingEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_debug_marker"]) => {
+        vkDebugMarkerSetObjectTagEXT: vk::PFN_vkDebugMarkerSetObjectTagEXT;
+        vkDebugMarkerSetObjectNameEXT: vk::PFN_vkDebugMarkerSetObjectNameEXT;
+        vkCmdDebugMarkerBeginEXT: vk::PFN_vkCmdDebugMarkerBeginEXT;
+        vkCmdDebugMarkerEndEXT: vk::PFN_vkCmdDebugMarkerEndEXT;
+        vkCmdDebugMarkerInsertEXT: vk::PFN_vkCmdDebugMarkerInsertEXT;
     }
     Instance, InstanceExtension(&[c"VK_EXT_debug_report"]) => {
         vkCreateDebugReportCallbackEXT: vk::PFN_vkCreateDebugReportCallbackEXT;
@@ -294,6 +304,9 @@ static ROWS: &[Command] = rows! {
         vkCreateDebugUtilsMessengerEXT: vk::PFN_vkCreateDebugUtilsMessengerEXT;
         vkDestroyDebugUtilsMessengerEXT: vk::PFN_vkDestroyDebugUtilsMessengerEXT;
         vkSubmitDebugUtilsMessageEXT: vk::PFN_vkSubmitDebugUtilsMessageEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_depth_bias_control"]) => {
+        vkCmdSetDepthBias2EXT: vk::PFN_vkCmdSetDepthBias2EXT;
     }
     Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state"]) => {
         vkCmdSetCullModeEXT = vkCmdSetCullMode;
@@ -351,6 +364,12 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_EXT_multi_draw"]) => {
         vkCmdDrawMultiEXT: vk::PFN_vkCmdDrawMultiEXT;
         vkCmdDrawMultiIndexedEXT: vk::PFN_vkCmdDrawMultiIndexedEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_pageable_device_local_memory"]) => {
+        vkSetDeviceMemoryPriorityEXT: vk::PFN_vkSetDeviceMemoryPriorityEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_primitive_restart_index"]) => {
+        vkCmdSetPrimitiveRestartIndexEXT: crate::registry::newer::PFN_vkCmdSetPrimitiveRestartIndexEXT;
     }
     Device, DeviceExtension(&[c"VK_EXT_private_data"]) => {
         vkCreatePrivateDataSlotEXT = vkCreatePrivateDataSlot;
@@ -444,6 +463,10 @@ static ROWS: &[Command] = rows! {
         vkCmdBeginRenderingKHR = vkCmdBeginRendering;
         vkCmdEndRenderingKHR = vkCmdEndRendering;
     }
+    Device, DeviceExtension(&[c"VK_KHR_dynamic_rendering_local_read"]) => {
+        vkCmdSetRenderingAttachmentLocationsKHR: vk::PFN_vkCmdSetRenderingAttachmentLocationsKHR;
+        vkCmdSetRenderingInputAttachmentIndicesKHR: vk::PFN_vkCmdSetRenderingInputAttachmentIndicesKHR;
+    }
     PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_fence_capabilities"]) => {
         vkGetPhysicalDeviceExternalFencePropertiesKHR = vkGetPhysicalDeviceExternalFenceProperties;
     }
@@ -471,6 +494,9 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceSurfaceCapabilities2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceCapabilities2KHR;
         vkGetPhysicalDeviceSurfaceFormats2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceFormats2KHR;
     }
+    Device, DeviceExtension(&[c"VK_KHR_line_rasterization"]) => {
+        vkCmdSetLineStippleKHR = vkCmdSetLineStippleEXT;
+    }
     Device, DeviceExtension(&[c"VK_KHR_maintenance1"]) => {
         vkTrimCommandPoolKHR = vkTrimCommandPool;
     }
@@ -481,6 +507,18 @@ static ROWS: &[Command] = rows! {
         vkGetDeviceBufferMemoryRequirementsKHR = vkGetDeviceBufferMemoryRequirements;
         vkGetDeviceImageMemoryRequirementsKHR = vkGetDeviceImageMemoryRequirements;
         vkGetDeviceImageSparseMemoryRequirementsKHR = vkGetDeviceImageSparseMemoryRequirements;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_maintenance5"]) => {
+        vkCmdBindIndexBuffer2KHR: vk::PFN_vkCmdBindIndexBuffer2KHR;
+        vkGetRenderingAreaGranularityKHR: vk::PFN_vkGetRenderingAreaGranularityKHR;
+        vkGetDeviceImageSubresourceLayoutKHR: vk::PFN_vkGetDeviceImageSubresourceLayoutKHR;
+        vkGetImageSubresourceLayout2KHR: vk::PFN_vkGetImageSubresourceLayout2KHR;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_maintenance6"]) => {
+        vkCmdBindDescriptorSets2KHR: vk::PFN_vkCmdBindDescriptorSets2KHR;
+        vkCmdPushConstants2KHR: vk::PFN_vkCmdPushConstants2KHR;
+        vkCmdPushDescriptorSet2KHR: vk::PFN_vkCmdPushDescriptorSet2KHR;
+        vkCmdPushDescriptorSetWithTemplate2KHR: vk::PFN_vkCmdPushDescriptorSetWithTemplate2KHR;
     }
     Device, DeviceExtension(&[c"VK_KHR_map_memory2"]) => {
         vkMapMemory2KHR: vk::PFN_vkMapMemory2KHR;
@@ -809,6 +847,7 @@ unsafe extern "system" fn vkAllocateMemory(
             handle::get(device)?,
             info,
             valid::find_in_chain::<vk::ExportMemoryAllocateInfo<'_>>(info.p_next),
+            valid::find_in_chain::<vk::MemoryPriorityAllocateInfoEXT<'_>>(info.p_next),
         )?;
         valid::output(p_memory, handle::create(memory))
     })
@@ -1102,6 +1141,7 @@ unsafe extern "system" fn vkCreateBuffer(
             handle::get(device)?,
             info,
             valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo<'_>>(info.p_next),
+            valid::find_in_chain::<vk::BufferUsageFlags2CreateInfoKHR<'_>>(info.p_next),
         )?;
         valid::output(p_buffer, handle::create(buffer))
     })
@@ -2229,7 +2269,7 @@ unsafe extern "system" fn vkCmdBindIndexBuffer(
     // SAFETY: the application follows Vulkan's valid usage.
     unsafe {
         record(command_buffer, "vkCmdBindIndexBuffer", |recorder| {
-            command::bind::cmd_bind_index_buffer(recorder, handle::get(buffer)?, offset, index_type)
+            command::bind::cmd_bind_index_buffer(recorder, handle::get_optional(buffer)?, offset, index_type)
         })
     }
 }
@@ -3480,6 +3520,13 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     }
 }
 
+unsafe extern "system" fn vkCmdSetAttachmentFeedbackLoopEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::ImageAspectFlags,
+) {
+    guard(command_buffer, "vkCmdSetAttachmentFeedbackLoopEnableEXT", || Ok(()))
+}
+
 unsafe extern "system" fn vkGetPhysicalDeviceCalibrateableTimeDomainsEXT(
     physical_device: vk::PhysicalDevice,
     p_time_domain_count: *mut u32,
@@ -3549,6 +3596,38 @@ unsafe extern "system" fn vkCmdEndConditionalRenderingEXT(command_buffer: vk::Co
             command::conditional::cmd_end_conditional_rendering(recorder)
         })
     }
+}
+
+unsafe extern "system" fn vkDebugMarkerSetObjectTagEXT(
+    device: vk::Device,
+    _: *const vk::DebugMarkerObjectTagInfoEXT<'_>,
+) -> vk::Result {
+    guard(device, "vkDebugMarkerSetObjectTagEXT", || Ok(()))
+}
+
+unsafe extern "system" fn vkDebugMarkerSetObjectNameEXT(
+    device: vk::Device,
+    _: *const vk::DebugMarkerObjectNameInfoEXT<'_>,
+) -> vk::Result {
+    guard(device, "vkDebugMarkerSetObjectNameEXT", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdDebugMarkerBeginEXT(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::DebugMarkerMarkerInfoEXT<'_>,
+) {
+    guard(command_buffer, "vkCmdDebugMarkerBeginEXT", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdDebugMarkerEndEXT(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdDebugMarkerEndEXT", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdDebugMarkerInsertEXT(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::DebugMarkerMarkerInfoEXT<'_>,
+) {
+    guard(command_buffer, "vkCmdDebugMarkerInsertEXT", || Ok(()))
 }
 
 unsafe extern "system" fn vkCreateDebugReportCallbackEXT(
@@ -3683,6 +3762,23 @@ unsafe extern "system" fn vkSubmitDebugUtilsMessageEXT(
             valid::input(p_callback_data)?,
         )
     })
+}
+
+unsafe extern "system" fn vkCmdSetDepthBias2EXT(
+    command_buffer: vk::CommandBuffer,
+    p_depth_bias_info: *const vk::DepthBiasInfoEXT<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdSetDepthBias2EXT", |recorder| {
+            let info = valid::input(p_depth_bias_info)?;
+            command::dynamic_state::cmd_set_depth_bias2(
+                recorder,
+                info,
+                valid::find_in_chain::<vk::DepthBiasRepresentationInfoEXT<'_>>(info.p_next),
+            )
+        })
+    }
 }
 
 unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::CommandBuffer, patch_control_points: u32) {
@@ -3998,6 +4094,25 @@ unsafe extern "system" fn vkCmdDrawMultiIndexedEXT(
                 stride,
                 p_vertex_offset,
             )
+        })
+    }
+}
+
+unsafe extern "system" fn vkSetDeviceMemoryPriorityEXT(device: vk::Device, memory: vk::DeviceMemory, priority: f32) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkSetDeviceMemoryPriorityEXT", || unsafe {
+        resource::memory::set_device_memory_priority(handle::get(device)?, handle::get(memory)?, priority)
+    })
+}
+
+unsafe extern "system" fn vkCmdSetPrimitiveRestartIndexEXT(
+    command_buffer: vk::CommandBuffer,
+    primitive_restart_index: u32,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdSetPrimitiveRestartIndexEXT", |recorder| {
+            command::bind::cmd_set_primitive_restart_index(recorder, primitive_restart_index)
         })
     }
 }
@@ -4378,6 +4493,20 @@ unsafe extern "system" fn vkAcquireNextImage2KHR(
     })
 }
 
+unsafe extern "system" fn vkCmdSetRenderingAttachmentLocationsKHR(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::RenderingAttachmentLocationInfoKHR<'_>,
+) {
+    guard(command_buffer, "vkCmdSetRenderingAttachmentLocationsKHR", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdSetRenderingInputAttachmentIndicesKHR(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::RenderingInputAttachmentIndexInfoKHR<'_>,
+) {
+    guard(command_buffer, "vkCmdSetRenderingInputAttachmentIndicesKHR", || Ok(()))
+}
+
 unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilities2KHR(
     physical_device: vk::PhysicalDevice,
     p_surface_info: *const vk::PhysicalDeviceSurfaceInfo2KHR<'_>,
@@ -4403,6 +4532,141 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormats2KHR(
     guard(physical_device, "vkGetPhysicalDeviceSurfaceFormats2KHR", || unsafe {
         surface::get_physical_device_surface_formats2(Structures::new(p_surface_format_count, p_surface_formats)?)
     })
+}
+
+unsafe extern "system" fn vkCmdBindIndexBuffer2KHR(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    size: vk::DeviceSize,
+    index_type: vk::IndexType,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdBindIndexBuffer2KHR", |recorder| {
+            command::bind::cmd_bind_index_buffer2(recorder, handle::get_optional(buffer)?, offset, size, index_type)
+        })
+    }
+}
+
+unsafe extern "system" fn vkGetRenderingAreaGranularityKHR(
+    device: vk::Device,
+    _: *const vk::RenderingAreaInfoKHR<'_>,
+    p_granularity: *mut vk::Extent2D,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetRenderingAreaGranularityKHR", || unsafe {
+        let granularity = render_pass::get_render_area_granularity()?;
+        valid::output(p_granularity, granularity)
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceImageSubresourceLayoutKHR(
+    device: vk::Device,
+    p_info: *const vk::DeviceImageSubresourceInfoKHR<'_>,
+    p_layout: *mut vk::SubresourceLayout2KHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetDeviceImageSubresourceLayoutKHR", || unsafe {
+        let info = valid::input(p_info)?;
+        resource::image::get_device_image_subresource_layout(
+            valid::input(info.p_create_info)?,
+            valid::input(info.p_subresource)?,
+            valid::output_structure(p_layout)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkGetImageSubresourceLayout2KHR(
+    device: vk::Device,
+    image: vk::Image,
+    p_subresource: *const vk::ImageSubresource2KHR<'_>,
+    p_layout: *mut vk::SubresourceLayout2KHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetImageSubresourceLayout2KHR", || unsafe {
+        resource::image::get_image_subresource_layout2(
+            handle::get(image)?,
+            valid::input(p_subresource)?,
+            valid::output_structure(p_layout)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkCmdBindDescriptorSets2KHR(
+    command_buffer: vk::CommandBuffer,
+    p_bind_descriptor_sets_info: *const vk::BindDescriptorSetsInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdBindDescriptorSets2KHR", |recorder| {
+            let info = valid::input(p_bind_descriptor_sets_info)?;
+            command::bind::cmd_bind_descriptor_sets2(
+                recorder,
+                info.stage_flags,
+                handle::get(info.layout)?,
+                info.first_set,
+                handle::Handles::new(valid::slice(info.p_descriptor_sets, info.descriptor_set_count)?),
+                valid::slice(info.p_dynamic_offsets, info.dynamic_offset_count)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushConstants2KHR(
+    command_buffer: vk::CommandBuffer,
+    p_push_constants_info: *const vk::PushConstantsInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushConstants2KHR", |recorder| {
+            let info = valid::input(p_push_constants_info)?;
+            command::bind::cmd_push_constants(
+                recorder,
+                handle::get(info.layout)?,
+                info.offset,
+                valid::slice(info.p_values.cast::<u8>(), info.size)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSet2KHR(
+    command_buffer: vk::CommandBuffer,
+    p_push_descriptor_set_info: *const vk::PushDescriptorSetInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushDescriptorSet2KHR", |recorder| {
+            let info = valid::input(p_push_descriptor_set_info)?;
+            command::bind::cmd_push_descriptor_set2(
+                recorder,
+                info.stage_flags,
+                handle::get(info.layout)?,
+                info.set,
+                valid::slice(info.p_descriptor_writes, info.descriptor_write_count)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplate2KHR(
+    command_buffer: vk::CommandBuffer,
+    p_push_descriptor_set_with_template_info: *const vk::PushDescriptorSetWithTemplateInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushDescriptorSetWithTemplate2KHR", |recorder| {
+            let info = valid::input(p_push_descriptor_set_with_template_info)?;
+            command::bind::cmd_push_descriptor_set_with_template(
+                recorder,
+                handle::get(info.descriptor_update_template)?,
+                handle::get(info.layout)?,
+                info.set,
+                info.p_data,
+            )
+        })
+    }
 }
 
 unsafe extern "system" fn vkMapMemory2KHR(

@@ -304,7 +304,9 @@ fn find_properties() -> Properties {
             | vk::SubgroupFeatureFlags::SHUFFLE
             | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
             | vk::SubgroupFeatureFlags::CLUSTERED
-            | vk::SubgroupFeatureFlags::QUAD,
+            | vk::SubgroupFeatureFlags::QUAD
+            | vk::SubgroupFeatureFlags::ROTATE_KHR
+            | vk::SubgroupFeatureFlags::ROTATE_CLUSTERED_KHR,
         subgroup_quad_operations_in_all_stages: true,
         point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
         max_multiview_view_count: u32::BITS,
@@ -441,6 +443,22 @@ fn find_properties() -> Properties {
         // The fragment stage alone says how its inputs are interpolated.
         graphics_pipeline_library_independent_interpolation_decoration: true,
         max_vertex_attrib_divisor: u32::MAX,
+        supports_non_zero_first_instance: true,
+        early_fragment_multisample_coverage_after_sample_counting: true,
+        early_fragment_sample_mask_test_before_sample_counting: true,
+        depth_stencil_swizzle_one_support: true,
+        polygon_mode_point_size: true,
+        // Lines are strict.
+        non_strict_single_pixel_wide_lines_use_parallelogram: false,
+        non_strict_wide_lines_use_parallelogram: false,
+        block_texel_view_compatible_multiple_layers: false,
+        max_combined_image_sampler_descriptor_count: 1,
+        fragment_shading_rate_clamp_combiner_inputs: false,
+        // The device knows no less robust access.
+        default_robustness_storage_buffers: vk::PipelineRobustnessBufferBehaviorEXT::ROBUST_BUFFER_ACCESS_2,
+        default_robustness_uniform_buffers: vk::PipelineRobustnessBufferBehaviorEXT::ROBUST_BUFFER_ACCESS_2,
+        default_robustness_vertex_inputs: vk::PipelineRobustnessBufferBehaviorEXT::ROBUST_BUFFER_ACCESS_2,
+        default_robustness_images: vk::PipelineRobustnessImageBehaviorEXT::ROBUST_IMAGE_ACCESS_2,
         tile_size: vk::Extent2D { width: 16, height: 16 },
         max_spherical_harmonics_degree: MAX_SPHERICAL_HARMONICS_DEGREE,
         gaussian_sample_counts: SAMPLE_COUNTS,

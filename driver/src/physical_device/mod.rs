@@ -7,7 +7,7 @@ pub(crate) mod memory;
 
 use self::formats::ImageQuery;
 use crate::abi::error::Error;
-use crate::abi::valid::{self, OutputChain, Structures};
+use crate::abi::valid::{self, ChainedOutput, OutputChain, Structures};
 use crate::instance::extension_properties;
 use crate::options;
 use crate::registry::{self, features::SUPPORTED};
@@ -28,6 +28,9 @@ pub(crate) const QUEUE_FAMILIES: [vk::QueueFlags; 3] = [
 
 /// The number of queues of each family.
 pub(crate) const QUEUE_COUNT: u32 = 1;
+
+/// The global priority of each queue: the system's default.
+pub(crate) const GLOBAL_PRIORITY: vk::QueueGlobalPriorityKHR = vk::QueueGlobalPriorityKHR::MEDIUM;
 
 /// `VkQueueFamilyProperties` of a family. Timestamps are the host's nanoseconds in 64 bits.
 fn queue_family_properties(queue_flags: vk::QueueFlags) -> vk::QueueFamilyProperties {
@@ -191,9 +194,19 @@ pub(crate) fn get_physical_device_queue_family_properties2(
     let fill = |index: usize, family: &mut vk::QueueFamilyProperties2<'_>| {
         let flags = QUEUE_FAMILIES.get(index).copied().unwrap_or_default();
         family.queue_family_properties = self::queue_family_properties(flags);
+        // SAFETY: the application initialised the structure, and lends its chain to this command.
+        unsafe { valid::for_each_output(family.p_next, write_family) };
     };
     let count = QUEUE_FAMILIES.len();
     queue_family_properties.fill(count, fill).map(drop)
+}
+
+/// Writes what a structure in the chain of a queue family's properties asks for, which is the same for each family.
+fn write_family(mut structure: ChainedOutput<'_>) {
+    if let Some(out) = structure.cast::<vk::QueueFamilyGlobalPriorityPropertiesKHR<'_>>() {
+        out.priority_count = 1;
+        out.priorities[0] = GLOBAL_PRIORITY;
+    }
 }
 
 #[doc(alias = "vkGetPhysicalDeviceMemoryProperties")]

@@ -5,10 +5,12 @@ use super::parts::{GraphicsState, Parts, VertexInput, all_parts};
 use crate::abi::error::Error;
 use crate::abi::handle;
 use crate::abi::valid;
+use crate::convert;
 use crate::device::Device;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk as gvk;
+use std::ffi::c_void;
 
 /// A copy of a structure without its chain. It names all other members, so that none is forgotten.
 macro_rules! unchained {
@@ -77,7 +79,7 @@ pub(super) unsafe fn read(
             // Without a render pass, formats say whether there is such an attachment; the fragment output
             // interface has them.
             let is_unknown = info.render_pass == vk::RenderPass::null() && !has_output;
-            if subpass.has_depth_stencil || is_unknown {
+            if subpass.has_depth || subpass.has_stencil || is_unknown {
                 graphics.fragment_shader.depth_stencil = valid::optional(info.p_depth_stencil_state).map(depth_stencil);
             }
         }
@@ -88,16 +90,30 @@ pub(super) unsafe fn read(
     Ok(graphics)
 }
 
+/// The flags of a create info: those of its chain, or else its own. The first 32 flags of the longer word are those of
+/// the shorter, and the device has none of the others.
+///
+/// # Safety
+/// The chain is valid.
+pub(super) unsafe fn flags(own: vk::PipelineCreateFlags, chain: *const c_void) -> vk::PipelineCreateFlags {
+    // SAFETY: the caller's promise.
+    let longer = unsafe { valid::find_in_chain::<vk::PipelineCreateFlags2CreateInfoKHR<'_>>(chain) };
+    longer.map_or(own, |given| vk::PipelineCreateFlags::from_raw(given.flags.as_raw() as u32))
+}
+
 /// The parts that a create info has itself, beside those of the libraries that it links.
 ///
 /// # Safety
 /// The create info and its chain are valid.
 unsafe fn parts(info: &vk::GraphicsPipelineCreateInfo<'_>, has_libraries: bool) -> Parts {
     // SAFETY: the caller's promise.
-    let given = unsafe { valid::find_in_chain::<vk::GraphicsPipelineLibraryCreateInfoEXT<'_>>(info.p_next) };
+    let (given, flags) = unsafe {
+        let given = valid::find_in_chain::<vk::GraphicsPipelineLibraryCreateInfoEXT<'_>>(info.p_next);
+        (given, flags(info.flags, info.p_next))
+    };
     match given {
         Some(given) => given.flags & all_parts(),
-        None if has_libraries || info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) => Parts::empty(),
+        None if has_libraries || flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) => Parts::empty(),
         None => all_parts(),
     }
 }
@@ -236,6 +252,8 @@ unsafe fn read_rasterization(
         }
         if let Some(state) = valid::optional(info.p_rasterization_state) {
             own.rasterization = rasterization(state);
+            let representation = valid::find_in_chain::<vk::DepthBiasRepresentationInfoEXT<'_>>(state.p_next);
+            own.depth_bias_unit = convert::depth_bias_unit(representation)?;
             let provoking =
                 valid::find_in_chain::<vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT<'_>>(state.p_next);
             own.provoking_last =
@@ -299,10 +317,16 @@ unsafe fn read_output(
     let [dynamic_mask, dynamic_enables] =
         [S::SAMPLE_MASK_EXT, S::COLOR_WRITE_ENABLE_EXT].map(|state| graphics.is_dynamic(state));
     let own = &mut graphics.fragment_output;
-    own.has_depth_stencil = subpass.has_depth_stencil;
+    own.has_depth = subpass.has_depth;
+    own.has_stencil = subpass.has_stencil;
     own.color_formats = subpass.color_formats;
     // SAFETY: the caller's promise.
     unsafe {
+        let locations = valid::find_in_chain::<vk::RenderingAttachmentLocationInfoKHR<'_>>(info.p_next);
+        if let Some(given) = locations.filter(|given| !given.p_color_attachment_locations.is_null()) {
+            own.color_locations =
+                valid::slice(given.p_color_attachment_locations, given.color_attachment_count)?.to_vec();
+        }
         if let Some(state) = valid::optional(info.p_multisample_state) {
             own.multisample = multisample(state);
             if !dynamic_mask && let Some(mask) = valid::optional(state.p_sample_mask) {
@@ -336,8 +360,10 @@ unsafe fn read_output(
 struct Subpass {
     /// The formats by colour attachment; undefined if unused.
     color_formats: Vec<vk::Format>,
-    /// True if there is a depth or stencil attachment.
-    has_depth_stencil: bool,
+    /// True if there is a depth attachment.
+    has_depth: bool,
+    /// True if there is a stencil attachment.
+    has_stencil: bool,
     /// The views that draws render to, a bit each; 0 without views.
     view_mask: u32,
 }
@@ -361,7 +387,8 @@ impl Subpass {
                 let subpass = render_pass.subpasses.get(index).ok_or_else(missing)?;
                 return Ok(Self {
                     color_formats: render_pass.color_formats(index).ok_or_else(missing)?,
-                    has_depth_stencil: subpass.depth_stencil.is_some(),
+                    has_depth: subpass.depth_stencil.is_some(),
+                    has_stencil: subpass.depth_stencil.is_some(),
                     view_mask: subpass.view_mask,
                 });
             }
@@ -375,8 +402,8 @@ impl Subpass {
             let undefined = vk::Format::UNDEFINED;
             Ok(Self {
                 color_formats: color.to_vec(),
-                has_depth_stencil: rendering.depth_attachment_format != undefined
-                    || rendering.stencil_attachment_format != undefined,
+                has_depth: rendering.depth_attachment_format != undefined,
+                has_stencil: rendering.stencil_attachment_format != undefined,
                 view_mask: rendering.view_mask,
             })
         }

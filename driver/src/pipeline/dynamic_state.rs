@@ -277,9 +277,10 @@ dynamic_states! {
         needed Fixed::has_colors, gaussians Taken;
 }
 
-/// The dynamic states that are looked up for each draw, and for which no row has a value: viewports, scissors, strides
-/// and vertex input. For Gaussians all but vertex input are allowed.
-const LOOKED_UP: [(vk::DynamicState, Parts); 6] = {
+/// The dynamic states for which no row has a value: those that are looked up for each draw, which are viewports, scissors,
+/// strides and vertex input; and whether attachments are read, which they always may be. For Gaussians all but vertex
+/// input are allowed.
+const LOOKED_UP: [(vk::DynamicState, Parts); 7] = {
     use vk::DynamicState as S;
     const VERTEX_INPUT: Parts = Parts::VERTEX_INPUT_INTERFACE;
     const PRE_RASTERIZATION: Parts = Parts::PRE_RASTERIZATION_SHADERS;
@@ -290,6 +291,7 @@ const LOOKED_UP: [(vk::DynamicState, Parts); 6] = {
         (S::SCISSOR_WITH_COUNT, PRE_RASTERIZATION),
         (S::VERTEX_INPUT_BINDING_STRIDE, VERTEX_INPUT),
         (S::VERTEX_INPUT_EXT, VERTEX_INPUT),
+        (S::ATTACHMENT_FEEDBACK_LOOP_ENABLE_EXT, Parts::FRAGMENT_SHADER),
     ]
 };
 

@@ -125,7 +125,9 @@ unsafe fn libraries<'a>(info: &'a vk::GraphicsPipelineCreateInfo<'_>) -> Result<
 /// # Safety
 /// The create info and its chain are valid.
 unsafe fn new_graphics_pipeline(device: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> Result<Pipeline, Error> {
-    let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
+    // SAFETY: the caller's promise.
+    let flags = unsafe { create_info::flags(info.flags, info.p_next) };
+    let is_library = flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
     device.enabled().require(!is_library || device.features().graphics_pipeline_library, || {
         Error::FeatureNotEnabled {
             vuid: "VUID-VkGraphicsPipelineCreateInfo-graphicsPipelineLibrary-06606",
@@ -151,7 +153,9 @@ unsafe fn new_graphics_pipeline(device: &Device, info: &vk::GraphicsPipelineCrea
 /// # Safety
 /// The create info and its chain are valid.
 unsafe fn new_compute_pipeline(device: &Device, info: &vk::ComputePipelineCreateInfo<'_>) -> Result<Pipeline, Error> {
-    if info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) {
+    // SAFETY: the caller's promise.
+    let flags = unsafe { create_info::flags(info.flags, info.p_next) };
+    if flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) {
         return Err(Error::FeatureNotPresent("a library of compute".into()));
     }
     if info.stage.stage != vk::ShaderStageFlags::COMPUTE {
@@ -236,7 +240,9 @@ pub(crate) unsafe fn create_graphics_pipelines(
 ) -> Result<vk::Result, Error> {
     // SAFETY: the caller's promise.
     let create = |info: &_| unsafe { new_graphics_pipeline(device, info) };
-    create_each(create_infos, pipelines, |info| info.flags, create)
+    // SAFETY: the caller's promise.
+    let flags = |info: &vk::GraphicsPipelineCreateInfo<'_>| unsafe { create_info::flags(info.flags, info.p_next) };
+    create_each(create_infos, pipelines, flags, create)
 }
 
 /// # Safety
@@ -249,7 +255,9 @@ pub(crate) unsafe fn create_compute_pipelines(
 ) -> Result<vk::Result, Error> {
     // SAFETY: the caller's promise.
     let create = |info: &_| unsafe { new_compute_pipeline(device, info) };
-    create_each(create_infos, pipelines, |info| info.flags, create)
+    // SAFETY: the caller's promise.
+    let flags = |info: &vk::ComputePipelineCreateInfo<'_>| unsafe { create_info::flags(info.flags, info.p_next) };
+    create_each(create_infos, pipelines, flags, create)
 }
 
 #[doc(alias = "vkCreatePipelineCache")]

@@ -10,6 +10,7 @@ use gaurast::vk::{
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
     PipelineGaussianUnscentedStateCreateInfoGAURAST,
 };
+use simdevice::state::DepthBiasUnit;
 use std::sync::Arc;
 
 /// A set of parts.
@@ -94,6 +95,8 @@ pub(crate) struct PreRasterizationState {
     pub(crate) scissors: Vec<vk::Rect2D>,
     /// Rasterization state.
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'static>,
+    /// The unit of the constant depth bias.
+    pub(crate) depth_bias_unit: DepthBiasUnit,
     /// True if the provoking vertex is a primitive's last, not its first.
     pub(crate) provoking_last: bool,
     /// The vertex stream that is rasterized.
@@ -146,8 +149,12 @@ pub(crate) struct FragmentOutputState {
     pub(crate) blend_constants: [f32; 4],
     /// The colour formats of the subpass; undefined if the attachment is unused.
     pub(crate) color_formats: Vec<vk::Format>,
-    /// True if the subpass has a depth or stencil attachment.
-    pub(crate) has_depth_stencil: bool,
+    /// The location whose output each colour attachment takes; empty if it is the attachment's number.
+    pub(crate) color_locations: Vec<u32>,
+    /// True if the subpass has a depth attachment.
+    pub(crate) has_depth: bool,
+    /// True if the subpass has a stencil attachment.
+    pub(crate) has_stencil: bool,
     /// True if fragments read colour attachments in rasterization order.
     pub(crate) reads_colors: bool,
 }
@@ -162,7 +169,9 @@ impl Default for FragmentOutputState {
             color_write_enables: Vec::new(),
             blend_constants: [0.0; 4],
             color_formats: Vec::new(),
-            has_depth_stencil: false,
+            color_locations: Vec::new(),
+            has_depth: false,
+            has_stencil: false,
             reads_colors: false,
         }
     }
@@ -265,7 +274,7 @@ impl GraphicsState {
     /// Depth and stencil state, if the subpass has such an attachment.
     pub(crate) fn depth_stencil(&self) -> Option<&vk::PipelineDepthStencilStateCreateInfo<'static>> {
         let state = self.fragment_shader.depth_stencil.as_ref();
-        state.filter(|_| self.fragment_output.has_depth_stencil)
+        state.filter(|_| self.fragment_output.has_depth || self.fragment_output.has_stencil)
     }
 
     /// Reports whether there are tessellation stages.

@@ -76,7 +76,10 @@ impl PrimitivePipeline {
             Error::usage("VUID-VkGraphicsPipelineCreateInfo-layout-06602", "the pipeline has no layout")
         })?;
         let stages = Stages::find(device, graphics)?;
-        let shaders = stages.translate(device, layout, fixed.draw.samples)?;
+        let mut shaders = stages.translate(device, layout, fixed.draw.samples)?;
+        if let Some(fragment) = &mut shaders.fragment {
+            stages::place_outputs(fragment, &graphics.fragment_output.color_locations);
+        }
         link_primitives::check(
             shaders.tessellation.as_ref(),
             shaders.geometry.as_ref(),

@@ -221,6 +221,10 @@ pub(crate) struct FixedFunctionState {
     pub(super) patch_control_points: u32,
     pub(super) depth_bias_enable: bool,
     pub(super) depth_bias: DepthBias,
+    /// True if the pipeline has a depth attachment; without it, no depth is tested, whatever attachments a pass has.
+    has_depth: bool,
+    /// The same of a stencil attachment.
+    has_stencil: bool,
     pub(super) depth_test: bool,
     pub(super) depth_write: bool,
     pub(super) depth_compare: CompareOp,
@@ -359,9 +363,12 @@ impl FixedFunctionState {
             depth_bias_enable: raster.depth_bias_enable != vk::FALSE,
             depth_bias: DepthBias {
                 constant: raster.depth_bias_constant_factor,
+                unit: graphics.pre_rasterization.depth_bias_unit,
                 clamp: raster.depth_bias_clamp,
                 slope: raster.depth_bias_slope_factor,
             },
+            has_depth: graphics.fragment_output.has_depth,
+            has_stencil: graphics.fragment_output.has_stencil,
             depth_test: false,
             depth_write: false,
             depth_compare: CompareOp::Always,
@@ -631,9 +638,10 @@ impl FixedFunctionState {
         DrawState {
             depth_bias: self.depth_bias_enable.then_some(self.depth_bias),
             depth_stencil: DepthStencil {
-                depth: self.depth_test.then_some(DepthTest { compare: self.depth_compare, write: self.depth_write }),
-                bounds: self.depth_bounds_test.then_some(self.depth_bounds),
-                stencil: self.stencil_test.then_some(self.stencil),
+                depth: (self.has_depth && self.depth_test)
+                    .then_some(DepthTest { compare: self.depth_compare, write: self.depth_write }),
+                bounds: (self.has_depth && self.depth_bounds_test).then_some(self.depth_bounds),
+                stencil: (self.has_stencil && self.stencil_test).then_some(self.stencil),
             },
             topology: match self.draw.topology {
                 Topology::PatchList { .. } => Topology::PatchList { control_points: self.patch_control_points },

@@ -166,6 +166,10 @@ features! {
         formatA4R4G4B4 => format_a4r4g4b4: true;
         formatA4B4G4R4 => format_a4b4g4r4: true;
     }
+    structure vk::PhysicalDeviceAttachmentFeedbackLoopDynamicStateFeaturesEXT:
+        c"VK_EXT_attachment_feedback_loop_dynamic_state" {
+        attachmentFeedbackLoopDynamicState => attachment_feedback_loop_dynamic_state: true;
+    }
     structure vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT: c"VK_EXT_attachment_feedback_loop_layout" {
         attachmentFeedbackLoopLayout => attachment_feedback_loop_layout: true;
     }
@@ -184,6 +188,12 @@ features! {
         customBorderColors => custom_border_colors: true;
         customBorderColorWithoutFormat => custom_border_color_without_format: true;
     }
+    structure vk::PhysicalDeviceDepthBiasControlFeaturesEXT: c"VK_EXT_depth_bias_control" {
+        depthBiasControl => depth_bias_control: true;
+        leastRepresentableValueForceUnormRepresentation => least_representable_value_force_unorm_representation: true;
+        floatRepresentation => float_representation: true;
+        depthBiasExact => depth_bias_exact: true;
+    }
     structure vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT: c"VK_EXT_depth_clamp_zero_one" {
         depthClampZeroOne => depth_clamp_zero_one: true;
     }
@@ -192,6 +202,10 @@ features! {
     }
     structure vk::PhysicalDeviceDepthClipEnableFeaturesEXT: c"VK_EXT_depth_clip_enable" {
         depthClipEnable => depth_clip_enable: true;
+    }
+    structure vk::PhysicalDeviceDynamicRenderingUnusedAttachmentsFeaturesEXT:
+        c"VK_EXT_dynamic_rendering_unused_attachments" {
+        dynamicRenderingUnusedAttachments => dynamic_rendering_unused_attachments: true;
     }
     structure vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT: c"VK_EXT_extended_dynamic_state" {
         extendedDynamicState => extended_dynamic_state: true;
@@ -238,6 +252,10 @@ features! {
             extended_dynamic_state3_representative_fragment_test_enable: false;
         extendedDynamicState3ShadingRateImageEnable => extended_dynamic_state3_shading_rate_image_enable: false;
     }
+    structure vk::PhysicalDeviceGlobalPriorityQueryFeaturesKHR:
+        c"VK_EXT_global_priority_query" | c"VK_KHR_global_priority" {
+        globalPriorityQuery => global_priority_query: true;
+    }
     structure vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT: c"VK_EXT_graphics_pipeline_library" {
         graphicsPipelineLibrary => graphics_pipeline_library: true;
     }
@@ -245,16 +263,20 @@ features! {
         image2DViewOf3D => image2_d_view_of3_d: true;
         sampler2DViewOf3D => sampler2_d_view_of3_d: true;
     }
-    structure vk::PhysicalDeviceIndexTypeUint8FeaturesKHR: c"VK_EXT_index_type_uint8" {
+    structure vk::PhysicalDeviceIndexTypeUint8FeaturesKHR: c"VK_EXT_index_type_uint8" | c"VK_KHR_index_type_uint8" {
         indexTypeUint8 => index_type_uint8: true;
     }
-    structure vk::PhysicalDeviceLineRasterizationFeaturesKHR: c"VK_EXT_line_rasterization" {
+    structure vk::PhysicalDeviceLineRasterizationFeaturesKHR:
+        c"VK_EXT_line_rasterization" | c"VK_KHR_line_rasterization" {
         rectangularLines => rectangular_lines: true;
         bresenhamLines => bresenham_lines: true;
         smoothLines => smooth_lines: true;
         stippledRectangularLines => stippled_rectangular_lines: true;
         stippledBresenhamLines => stippled_bresenham_lines: true;
         stippledSmoothLines => stippled_smooth_lines: true;
+    }
+    structure vk::PhysicalDeviceMemoryPriorityFeaturesEXT: c"VK_EXT_memory_priority" {
+        memoryPriority => memory_priority: true;
     }
     structure vk::PhysicalDeviceMultiDrawFeaturesEXT: c"VK_EXT_multi_draw" {
         multiDraw => multi_draw: true;
@@ -265,6 +287,19 @@ features! {
     }
     structure vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT: c"VK_EXT_non_seamless_cube_map" {
         nonSeamlessCubeMap => non_seamless_cube_map: true;
+    }
+    structure vk::PhysicalDevicePageableDeviceLocalMemoryFeaturesEXT: c"VK_EXT_pageable_device_local_memory" {
+        pageableDeviceLocalMemory => pageable_device_local_memory: true;
+    }
+    structure vk::PhysicalDevicePipelineProtectedAccessFeaturesEXT: c"VK_EXT_pipeline_protected_access" {
+        pipelineProtectedAccess => pipeline_protected_access: true;
+    }
+    structure vk::PhysicalDevicePipelineRobustnessFeaturesEXT: c"VK_EXT_pipeline_robustness" {
+        pipelineRobustness => pipeline_robustness: true;
+    }
+    structure crate::registry::newer::PhysicalDevicePrimitiveRestartIndexFeaturesEXT:
+        c"VK_EXT_primitive_restart_index" {
+        primitiveRestartIndex => primitive_restart_index: true;
     }
     structure vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT: c"VK_EXT_primitive_topology_list_restart" {
         primitiveTopologyListRestart => primitive_topology_list_restart: true;
@@ -285,7 +320,7 @@ features! {
         rasterizationOrderDepthAttachmentAccess => rasterization_order_depth_attachment_access: true;
         rasterizationOrderStencilAttachmentAccess => rasterization_order_stencil_attachment_access: true;
     }
-    structure vk::PhysicalDeviceRobustness2FeaturesEXT: c"VK_EXT_robustness2" {
+    structure vk::PhysicalDeviceRobustness2FeaturesEXT: c"VK_EXT_robustness2" | c"VK_KHR_robustness2" {
         robustBufferAccess2 => robust_buffer_access2: true;
         robustImageAccess2 => robust_image_access2: true;
         nullDescriptor => null_descriptor: true;
@@ -318,6 +353,10 @@ features! {
         shaderImageFloat32AtomicMinMax => shader_image_float32_atomic_min_max: true;
         sparseImageFloat32AtomicMinMax => sparse_image_float32_atomic_min_max: false;
     }
+    structure crate::registry::newer::PhysicalDeviceShaderReplicatedCompositesFeaturesEXT:
+        c"VK_EXT_shader_replicated_composites" {
+        shaderReplicatedComposites => shader_replicated_composites: true;
+    }
     structure vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT: c"VK_EXT_texel_buffer_alignment" {
         texelBufferAlignment => texel_buffer_alignment: true;
     }
@@ -325,7 +364,8 @@ features! {
         transformFeedback => transform_feedback: true;
         geometryStreams => geometry_streams: true;
     }
-    structure vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR: c"VK_EXT_vertex_attribute_divisor" {
+    structure vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR:
+        c"VK_EXT_vertex_attribute_divisor" | c"VK_KHR_vertex_attribute_divisor" {
         vertexAttributeInstanceRateDivisor => vertex_attribute_instance_rate_divisor: true;
         vertexAttributeInstanceRateZeroDivisor => vertex_attribute_instance_rate_zero_divisor: true;
     }
@@ -334,6 +374,10 @@ features! {
     }
     structure vk::PhysicalDeviceYcbcr2Plane444FormatsFeaturesEXT: c"VK_EXT_ycbcr_2plane_444_formats" {
         ycbcr2plane444Formats => ycbcr2plane444_formats: true;
+    }
+    structure crate::registry::newer::PhysicalDeviceZeroInitializeDeviceMemoryFeaturesEXT:
+        c"VK_EXT_zero_initialize_device_memory" {
+        zeroInitializeDeviceMemory => zero_initialize_device_memory: true;
     }
     structure gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST:
         c"VK_GAURAST_gaussian_primitive_topology" {
@@ -368,6 +412,15 @@ features! {
         attributeDecoding => attribute_decoding: true;
         gaussian2DCutOff => gaussian_2d_cut_off: true;
     }
+    structure vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR: c"VK_KHR_dynamic_rendering_local_read" {
+        dynamicRenderingLocalRead => dynamic_rendering_local_read: true;
+    }
+    structure vk::PhysicalDeviceMaintenance5FeaturesKHR: c"VK_KHR_maintenance5" {
+        maintenance5 => maintenance5: true;
+    }
+    structure vk::PhysicalDeviceMaintenance6FeaturesKHR: c"VK_KHR_maintenance6" {
+        maintenance6 => maintenance6: true;
+    }
     structure vk::PhysicalDevicePerformanceQueryFeaturesKHR: c"VK_KHR_performance_query" {
         performanceCounterQueryPools => performance_counter_query_pools: true;
         performanceCounterMultipleQueryPools => performance_counter_multiple_query_pools: false;
@@ -375,6 +428,30 @@ features! {
     structure vk::PhysicalDeviceShaderClockFeaturesKHR: c"VK_KHR_shader_clock" {
         shaderSubgroupClock => shader_subgroup_clock: true;
         shaderDeviceClock => shader_device_clock: true;
+    }
+    structure vk::PhysicalDeviceShaderExpectAssumeFeaturesKHR: c"VK_KHR_shader_expect_assume" {
+        shaderExpectAssume => shader_expect_assume: true;
+    }
+    structure vk::PhysicalDeviceShaderFloatControls2FeaturesKHR: c"VK_KHR_shader_float_controls2" {
+        shaderFloatControls2 => shader_float_controls2: true;
+    }
+    structure vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR: c"VK_KHR_shader_maximal_reconvergence" {
+        shaderMaximalReconvergence => shader_maximal_reconvergence: true;
+    }
+    structure vk::PhysicalDeviceShaderQuadControlFeaturesKHR: c"VK_KHR_shader_quad_control" {
+        shaderQuadControl => shader_quad_control: true;
+    }
+    structure crate::registry::newer::PhysicalDeviceShaderRelaxedExtendedInstructionFeaturesKHR:
+        c"VK_KHR_shader_relaxed_extended_instruction" {
+        shaderRelaxedExtendedInstruction => shader_relaxed_extended_instruction: true;
+    }
+    structure vk::PhysicalDeviceShaderSubgroupRotateFeaturesKHR: c"VK_KHR_shader_subgroup_rotate" {
+        shaderSubgroupRotate => shader_subgroup_rotate: true;
+        shaderSubgroupRotateClustered => shader_subgroup_rotate_clustered: true;
+    }
+    structure crate::registry::newer::PhysicalDeviceUnifiedImageLayoutsFeaturesKHR: c"VK_KHR_unified_image_layouts" {
+        unifiedImageLayouts => unified_image_layouts: true;
+        unifiedImageLayoutsVideo => unified_image_layouts_video: false;
     }
     structure vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR: c"VK_KHR_workgroup_memory_explicit_layout" {
         workgroupMemoryExplicitLayout => workgroup_memory_explicit_layout: true;

@@ -3,6 +3,7 @@
 
 pub(crate) mod extensions;
 pub(crate) mod features;
+pub(crate) mod newer;
 pub(crate) mod properties;
 pub(crate) mod spirv;
 mod tables;

@@ -299,6 +299,12 @@ properties! {
     structure vk::PhysicalDeviceMultiDrawPropertiesEXT {
         maxMultiDrawCount => max_multi_draw_count: u32;
     }
+    structure vk::PhysicalDevicePipelineRobustnessPropertiesEXT {
+        defaultRobustnessStorageBuffers => default_robustness_storage_buffers: vk::PipelineRobustnessBufferBehaviorEXT;
+        defaultRobustnessUniformBuffers => default_robustness_uniform_buffers: vk::PipelineRobustnessBufferBehaviorEXT;
+        defaultRobustnessVertexInputs => default_robustness_vertex_inputs: vk::PipelineRobustnessBufferBehaviorEXT;
+        defaultRobustnessImages => default_robustness_images: vk::PipelineRobustnessImageBehaviorEXT;
+    }
     structure vk::PhysicalDeviceProvokingVertexPropertiesEXT {
         provokingVertexModePerPipeline => provoking_vertex_mode_per_pipeline: bool;
         transformFeedbackPreservesTriangleFanProvokingVertex =>
@@ -333,11 +339,28 @@ properties! {
     structure gaurast::vk::PhysicalDeviceGaussianPrecisionPropertiesGAURAST {
         precisionClass => precision_class: gaurast::vk::GaussianPrecisionClassGAURAST;
     }
+    structure vk::PhysicalDeviceMaintenance5PropertiesKHR {
+        earlyFragmentMultisampleCoverageAfterSampleCounting =>
+            early_fragment_multisample_coverage_after_sample_counting: bool;
+        earlyFragmentSampleMaskTestBeforeSampleCounting => early_fragment_sample_mask_test_before_sample_counting: bool;
+        depthStencilSwizzleOneSupport => depth_stencil_swizzle_one_support: bool;
+        polygonModePointSize => polygon_mode_point_size: bool;
+        nonStrictSinglePixelWideLinesUseParallelogram => non_strict_single_pixel_wide_lines_use_parallelogram: bool;
+        nonStrictWideLinesUseParallelogram => non_strict_wide_lines_use_parallelogram: bool;
+    }
+    structure vk::PhysicalDeviceMaintenance6PropertiesKHR {
+        blockTexelViewCompatibleMultipleLayers => block_texel_view_compatible_multiple_layers: bool;
+        maxCombinedImageSamplerDescriptorCount => max_combined_image_sampler_descriptor_count: u32;
+        fragmentShadingRateClampCombinerInputs => fragment_shading_rate_clamp_combiner_inputs: bool;
+    }
     structure vk::PhysicalDevicePerformanceQueryPropertiesKHR {
         allowCommandBufferQueryCopies => allow_command_buffer_query_copies: bool;
     }
     structure vk::PhysicalDevicePushDescriptorPropertiesKHR {
         maxPushDescriptors => max_push_descriptors: u32;
+    }
+    structure vk::PhysicalDeviceVertexAttributeDivisorPropertiesKHR {
+        supportsNonZeroFirstInstance => supports_non_zero_first_instance: bool;
     }
     repeated vk::PhysicalDeviceProtectedMemoryProperties { protected_no_fault }
     repeated vk::PhysicalDeviceIDProperties {
@@ -422,4 +445,5 @@ properties! {
         storage_texel_buffer_offset_alignment_bytes, storage_texel_buffer_offset_single_texel_alignment,
         uniform_texel_buffer_offset_alignment_bytes, uniform_texel_buffer_offset_single_texel_alignment
     }
+    repeated vk::PhysicalDeviceVertexAttributeDivisorPropertiesKHR { max_vertex_attrib_divisor }
 }

@@ -4,14 +4,14 @@
 /// Declares `Features`, the features that are supported, and the functions between them and Vulkan's structures.
 ///
 /// A row is `name => field: is_supported;`, with `, mandatory version` if a core version requires the feature. It is in
-/// the first structure that holds the feature. The name of an extension follows each structure that it adds. `repeated`
-/// structures hold only features that have rows elsewhere. The `core` structure is in no chain.
+/// the first structure that holds the feature. The names of extensions follow each structure that each of them adds.
+/// `repeated` structures hold only features that have rows elsewhere. The `core` structure is in no chain.
 macro_rules! features {
     (
         core vk::$core:ident {$(
             $core_name:ident => $core_field:ident: $core_works:literal $(, mandatory $core_version:literal)?;
         )*}
-        $(structure $structure:path $(: $extension:literal)? {$(
+        $(structure $structure:path $(: $($extension:literal)|+)? {$(
             $name:ident => $field:ident: $works:literal $(, mandatory $version:literal)?;
         )*})*
         $(repeated $repeated:path { $($member:ident),* })*
@@ -78,10 +78,12 @@ macro_rules! features {
             }
         }
 
-        /// The extension without which the features of a structure can't be enabled; features of core need none.
-        pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
-            let extensions = [$($((<$structure>::STRUCTURE_TYPE, $extension),)?)*];
-            extensions.into_iter().find(|(holder, _)| *holder == structure).map(|(_, extension)| extension)
+        /// The extensions without any of which the features of a structure can't be enabled; features of core need
+        /// none.
+        pub(crate) fn extensions_of(structure: vk::StructureType) -> &'static [&'static CStr] {
+            const EXTENSIONS: &[(vk::StructureType, &[&CStr])] =
+                &[$($((<$structure>::STRUCTURE_TYPE, &[$($extension),+]),)?)*];
+            EXTENSIONS.iter().find(|(holder, _)| *holder == structure).map_or(&[], |(_, extensions)| *extensions)
         }
     };
 }

@@ -1,6 +1,6 @@
 //! Buffers and buffer views.
 
-use super::memory::Memory;
+use super::memory::{Memory, bind_all};
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid::OutputChain;
@@ -169,6 +169,7 @@ pub(crate) fn fits(vuid: &'static str, memory: &Allocation, offset: u64, size: u
 fn new_buffer(
     info: &vk::BufferCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
+    usage: vk::BufferUsageFlags,
     addresses: &Arc<Addresses>,
 ) -> Result<Buffer, Error> {
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
@@ -184,7 +185,7 @@ fn new_buffer(
     if info.size == 0 {
         return Err(Error::usage("VUID-VkBufferCreateInfo-size-00912", "the size of a buffer is 0"));
     }
-    let is_addressed = info.usage.contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+    let is_addressed = usage.contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
     Ok(Buffer::new(info.size, is_addressed.then(|| Arc::clone(addresses))))
 }
 
@@ -208,8 +209,11 @@ pub(crate) fn create_buffer(
     device: &Device,
     create_info: &vk::BufferCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
+    usage2: Option<&vk::BufferUsageFlags2CreateInfoKHR<'_>>,
 ) -> Result<Arc<Buffer>, Error> {
-    new_buffer(create_info, external, device.addresses()).map(Arc::new)
+    // The first 32 flags of the longer word are those of the shorter.
+    let usage = usage2.map_or(create_info.usage, |it| vk::BufferUsageFlags::from_raw(it.usage.as_raw() as u32));
+    new_buffer(create_info, external, usage, device.addresses()).map(Arc::new)
 }
 
 #[doc(alias = "vkGetBufferDeviceAddress")]
@@ -241,7 +245,7 @@ pub(crate) fn get_device_buffer_memory_requirements(
     create_info: &vk::BufferCreateInfo<'_>,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    let buffer = new_buffer(create_info, None, &Arc::default())?;
+    let buffer = new_buffer(create_info, None, vk::BufferUsageFlags::empty(), &Arc::default())?;
     fill_requirements(memory_requirements, buffer.requirements())
 }
 
@@ -254,11 +258,14 @@ pub(crate) fn bind_buffer_memory(buffer: &Buffer, memory: &Memory, memory_offset
 /// The handles are live.
 #[doc(alias = "vkBindBufferMemory2")]
 pub(crate) unsafe fn bind_buffer_memory2(bind_infos: &[vk::BindBufferMemoryInfo<'_>]) -> Result<(), Error> {
-    bind_infos.iter().try_for_each(|info| {
-        // SAFETY: the caller's promise.
-        let (buffer, memory) = unsafe { (handle::get(info.buffer)?, handle::get(info.memory)?) };
-        bind_buffer_memory(buffer, memory, info.memory_offset)
-    })
+    // SAFETY: the caller's promise, for the chains too.
+    unsafe {
+        bind_all(
+            bind_infos,
+            |info| info.p_next,
+            |info| bind_buffer_memory(handle::get(info.buffer)?, handle::get(info.memory)?, info.memory_offset),
+        )
+    }
 }
 
 /// The bytes of a texel, or of a component of one of three.

@@ -509,6 +509,32 @@ pub(crate) fn get_image_subresource_layout(
     image: &Image,
     subresource: &vk::ImageSubresource,
 ) -> Result<vk::SubresourceLayout, Error> {
+    subresource_layout(image, subresource)
+}
+
+#[doc(alias = "vkGetImageSubresourceLayout2KHR")]
+pub(crate) fn get_image_subresource_layout2(
+    image: &Image,
+    subresource: &vk::ImageSubresource2KHR<'_>,
+    layout: &mut vk::SubresourceLayout2KHR<'_>,
+) -> Result<(), Error> {
+    layout.subresource_layout = subresource_layout(image, &subresource.image_subresource)?;
+    Ok(())
+}
+
+#[doc(alias = "vkGetDeviceImageSubresourceLayoutKHR")]
+pub(crate) fn get_device_image_subresource_layout(
+    create_info: &vk::ImageCreateInfo<'_>,
+    subresource: &vk::ImageSubresource2KHR<'_>,
+    layout: &mut vk::SubresourceLayout2KHR<'_>,
+) -> Result<(), Error> {
+    let image = new_image(create_info, None, None)?;
+    layout.subresource_layout = subresource_layout(&image, &subresource.image_subresource)?;
+    Ok(())
+}
+
+/// The layout of a subresource in an image's memory.
+fn subresource_layout(image: &Image, subresource: &vk::ImageSubresource) -> Result<vk::SubresourceLayout, Error> {
     let missing = || {
         Error::usage(
             "VUID-vkGetImageSubresourceLayout-mipLevel-01716",

@@ -2,6 +2,7 @@
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
+use crate::abi::valid;
 use crate::device::Device;
 use crate::physical_device::memory::Heap;
 use ash::vk;
@@ -82,8 +83,12 @@ pub(crate) fn allocate_memory(
     device: &Device,
     allocate_info: &vk::MemoryAllocateInfo<'_>,
     exports: Option<&vk::ExportMemoryAllocateInfo<'_>>,
+    priority: Option<&vk::MemoryPriorityAllocateInfoEXT<'_>>,
 ) -> Result<Arc<Memory>, Error> {
     let info = allocate_info;
+    if let Some(given) = priority {
+        require_priority(device, "VUID-VkMemoryPriorityAllocateInfoEXT-priority-02602", given.priority)?;
+    }
     if exports.is_some_and(|export| !export.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("exporting memory".into()));
     }
@@ -94,6 +99,49 @@ pub(crate) fn allocate_memory(
         ));
     };
     Memory::new(heap, info.allocation_size, host_visible).map(Arc::new)
+}
+
+/// Binds resources to memory by their infos, whose chains are at `chain`. Each is tried, and its result is written where
+/// its chain asks for it.
+///
+/// # Errors
+/// The first error of `bind`.
+///
+/// # Safety
+/// The chains are valid.
+pub(crate) unsafe fn bind_all<T>(
+    infos: &[T],
+    chain: impl Fn(&T) -> *const c_void,
+    mut bind: impl FnMut(&T) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let mut first = Ok(());
+    for info in infos {
+        let bound = bind(info);
+        // SAFETY: the caller's promise.
+        unsafe {
+            if let Some(status) = valid::find_in_chain::<vk::BindMemoryStatusKHR<'_>>(chain(info)) {
+                let result = bound.as_ref().map_or_else(Error::result, |()| vk::Result::SUCCESS);
+                valid::output(status.p_result, result)?;
+            }
+        }
+        first = first.and(bound);
+    }
+    first
+}
+
+/// Warns of what is no priority of memory.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] on a strict device.
+fn require_priority(device: &Device, vuid: &'static str, priority: f32) -> Result<(), Error> {
+    let is_one = (0.0..=1.0).contains(&priority);
+    device.enabled().require(is_one, || Error::usage(vuid, format!("the priority {priority} is not from 0 to 1")))
+}
+
+/// Checks the priority only: memory is never moved, so that it makes no difference.
+#[doc(alias = "vkSetDeviceMemoryPriorityEXT")]
+pub(crate) fn set_device_memory_priority(device: &Device, _memory: &Memory, priority: f32) -> Result<(), Error> {
+    require_priority(device, "VUID-vkSetDeviceMemoryPriorityEXT-priority-06258", priority)
 }
 
 #[doc(alias = "vkMapMemory")]

@@ -2,13 +2,13 @@
 
 use super::viewport::WindowVertex;
 use crate::format::{Channel, Format, Numeric};
-use crate::state::DepthBias;
+use crate::state::{DepthBias, DepthBiasUnit};
 
 /// The smallest difference of depths that a depth attachment resolves, as Vulkan's `r`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum DepthUnit {
-    /// The same for all depths.
-    Fixed(f32),
+    /// The same for all depths, of so many bits.
+    Fixed(u32),
     /// The unit in the last place of a binary32 number with the exponent of the polygon's depth of greatest magnitude.
     Float,
 }
@@ -27,17 +27,26 @@ impl DepthUnit {
         });
         match depth {
             Some(_) if is_float => Self::Float,
-            // Vulkan allows twice the distance of neighbouring values.
-            bits => Self::Fixed((2.0 / ((1u64 << bits.unwrap_or(24)) - 1) as f64) as f32),
+            bits => Self::Fixed(bits.unwrap_or(24)),
         }
     }
 
-    fn at(self, greatest_depth: f32) -> f32 {
-        match self {
-            Self::Fixed(unit) => unit,
-            Self::Float => {
+    /// The unit of a bias of a polygon.
+    fn at(self, greatest_depth: f32, unit: DepthBiasUnit) -> f32 {
+        match (unit, self) {
+            (DepthBiasUnit::One, _) => 1.0,
+            (DepthBiasUnit::Format { .. }, Self::Float) => {
                 let exponent = greatest_depth.to_bits() & 0x7F80_0000;
                 f32::from_bits(exponent.saturating_sub(23 << 23))
+            }
+            (DepthBiasUnit::Format { is_exact } | DepthBiasUnit::FixedPoint { is_exact }, of) => {
+                let bits = match of {
+                    Self::Fixed(bits) => bits,
+                    Self::Float => f32::MANTISSA_DIGITS,
+                };
+                let steps = (1u64 << bits) as f64;
+                // Vulkan allows twice the distance of neighbouring values.
+                (if is_exact { 1.0 / steps } else { 2.0 / (steps - 1.0) }) as f32
             }
         }
     }
@@ -57,7 +66,7 @@ pub(super) fn bias(bias: &DepthBias, unit: DepthUnit, corners: [&WindowVertex; 3
     let slope = along_x.max(along_y);
     let slope = if slope.is_finite() { slope } else { 0.0 };
     let greatest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
-    let offset = unit.at(greatest) * bias.constant + slope * bias.slope;
+    let offset = unit.at(greatest, bias.unit) * bias.constant + slope * bias.slope;
     if bias.clamp > 0.0 {
         offset.min(bias.clamp)
     } else if bias.clamp < 0.0 {

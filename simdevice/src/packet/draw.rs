@@ -36,6 +36,8 @@ pub struct IndexStream {
     pub index_size: u32,
     /// The number that is added to every index.
     pub vertex_offset: i32,
+    /// The index that restarts a primitive; `None` for the greatest of its size.
+    pub restart: Option<u32>,
 }
 
 impl AttributeStream {
@@ -76,13 +78,13 @@ impl IndexStream {
         bytes.min(self.buffer.size) / u64::from(self.index_size.max(1))
     }
 
-    /// The index that restarts a primitive: the greatest of its size.
+    /// The index that restarts a primitive.
     pub(crate) fn restart_index(&self) -> u32 {
-        match self.index_size {
+        self.restart.unwrap_or(match self.index_size {
             1 => 0xFF,
             2 => 0xFFFF,
             _ => u32::MAX,
-        }
+        })
     }
 
     /// Reads `len` indices from number `first` on into `out`, without the vertex offset. Indices outside of the buffer

@@ -275,11 +275,43 @@ pub struct DepthTest {
     pub write: bool,
 }
 
+/// The unit of a constant depth bias, as Vulkan's `r`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthBiasUnit {
+    /// The resolution of the depth format: the same for all depths of a fixed-point format, and of a floating-point
+    /// format that of the greatest depth's exponent.
+    Format {
+        /// True if a fixed-point format's is exactly 2 to the power of minus its bits, and not a little more than twice
+        /// that.
+        is_exact: bool,
+    },
+    /// The resolution of a fixed-point format with as many bits; a floating-point format has 24.
+    FixedPoint {
+        /// As that of [`Format`](Self::Format).
+        is_exact: bool,
+    },
+    /// 1.
+    One,
+}
+
+impl DepthBiasUnit {
+    /// The unit unless something else is asked for.
+    pub const DEFAULT: Self = Self::Format { is_exact: false };
+}
+
+impl Default for DepthBiasUnit {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// Depth bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthBias {
-    /// The constant bias, in units of the depth format's resolution.
+    /// The constant bias, in units of `unit`.
     pub constant: f32,
+    /// The unit of the constant bias.
+    pub unit: DepthBiasUnit,
     /// The greatest bias if positive, the least bias if negative; no limit if 0.
     pub clamp: f32,
     /// The factor of the polygon's greatest depth slope.

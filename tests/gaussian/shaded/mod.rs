@@ -121,7 +121,7 @@ fn draws_indices_and_instances_make_one_sorted_set() {
     // Indices that name every Gaussian twice. The order is that of the positions in the index buffer.
     let indices: Vec<u16> = (0..700).chain((0..700).rev()).collect();
     let indexed = Draw {
-        indices: Some(IndexStream { buffer: buffer(&indices), index_size: 2, vertex_offset: 0 }),
+        indices: Some(IndexStream { buffer: buffer(&indices), index_size: 2, vertex_offset: 0, restart: None }),
         ..draw(&device, &outputs, 0, 1400)
     };
     let twice: Vec<_> = indices.iter().map(|&index| outputs[usize::from(index)]).collect();

@@ -481,6 +481,7 @@ fn append(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
             buffer: resources.range(bytes),
             index_size: bytes.one(&[1, 2, 4]),
             vertex_offset: bytes.number(9).cast_signed(),
+            restart: bytes.rarely(8).then(|| bytes.number(20)),
         }),
         first: bytes.number(20),
         // A larger count takes long and tests nothing more.

@@ -18,6 +18,7 @@
 //! | [`drawn`] | scenes that this driver and lavapipe draw |
 //! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
 //! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
+//! | [`newer`] | structures that are newer than ash, SPIR-V that is newer than the compiler |
 //! | [`presenter`] | a device that presents to a surface |
 //! | [`fetch`] | texels of images as programs fetch them |
 //! | [`texels`], [`exact_lavapipe`] | random texels, and a lavapipe that samples them as accurately as it can |
@@ -41,6 +42,7 @@ pub mod gaussians;
 pub mod gpu;
 pub mod loader;
 pub mod messages;
+pub mod newer;
 mod open;
 pub mod output;
 pub mod packets;

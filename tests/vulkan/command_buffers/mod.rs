@@ -3,3 +3,4 @@
 //! Unit tests: `driver/src/command`.
 
 mod life_cycle;
+mod markers;

@@ -3,5 +3,6 @@
 //! Unit tests: `driver/src/device.rs`, `driver/src/enabled.rs`, `driver/src/queue.rs`.
 
 mod not_enabled;
+mod priorities;
 mod queues;
 mod watchdog;

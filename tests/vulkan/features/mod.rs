@@ -4,4 +4,6 @@
 
 mod draw_limits;
 mod limits;
+mod maintenance;
+mod newer_names;
 mod robust_access;

@@ -5,5 +5,6 @@
 mod device_groups;
 mod device_memory;
 mod extended_usage;
+mod hints;
 mod linear_images;
 mod volumes_of_depths;

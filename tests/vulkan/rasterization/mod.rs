@@ -1,6 +1,7 @@
 //! The chapter *Rasterization*.
 
 mod coverage;
+mod depth_bias;
 mod extremes;
 mod interpolation;
 mod lines;

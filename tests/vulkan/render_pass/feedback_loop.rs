@@ -121,3 +121,54 @@ fn a_draw_reads_what_it_replaces(case: &Case) {
         assert_eq!(*pixel, [expected; 4], "pixel {place}");
     }
 }
+
+/// Whether attachments are read may be dynamic; they can be in any case.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn feedback_may_be_dynamic() {
+    let mut layout =
+        vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT::default().attachment_feedback_loop_layout(true);
+    let mut features = vk::PhysicalDeviceAttachmentFeedbackLoopDynamicStateFeaturesEXT::default()
+        .attachment_feedback_loop_dynamic_state(true);
+    features.p_next = (&raw mut layout).cast();
+    let names =
+        [ash::ext::attachment_feedback_loop_layout::NAME, ash::ext::attachment_feedback_loop_dynamic_state::NAME];
+    let gpu = Gpu::extended(&names, &mut features).expect("a device");
+    let dynamic = ash::ext::attachment_feedback_loop_dynamic_state::Device::new(gpu.instance(), gpu.device());
+    let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
+        | vk::ImageUsageFlags::SAMPLED
+        | vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT;
+    let format = vk::Format::R32G32B32A32_SFLOAT;
+    let image = Image::new(&gpu, &ImageOptions::new(format, [SIDE; 2], usage));
+    let sampler = Sampler::new(&gpu, &vk::SamplerCreateInfo::default());
+    let bindings = Bindings::new(&gpu, &[Resource::Texture(image.view, sampler.raw)]);
+    let target = Loop(image);
+    let options = PipelineOptions {
+        vertex: "void main() {
+            gl_Position = vec4(4.0 * (gl_VertexIndex & 1) - 1.0, 4.0 * (gl_VertexIndex >> 1) - 1.0, 0.0, 1.0);
+        }",
+        fragment: Some(
+            "layout(binding = 0) uniform sampler2D before;
+             layout(location = 0) out vec4 color;
+             void main() { color = 2.0 * texelFetch(before, ivec2(gl_FragCoord.xy), 0); }",
+        ),
+        bindings: Some(&bindings),
+        dynamic: vec![vk::DynamicState::ATTACHMENT_FEEDBACK_LOOP_ENABLE_EXT],
+        ..options()
+    };
+    let pipeline = Pipeline::new(&gpu, &target, &options);
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::clear([3.0; 4]), || {
+            commands.bind(&pipeline);
+            commands.bind_set(&bindings, &[]);
+            let (_, raw) = commands.raw();
+            // SAFETY: see the crate.
+            unsafe {
+                (dynamic.fp().cmd_set_attachment_feedback_loop_enable_ext)(raw, vk::ImageAspectFlags::COLOR);
+            }
+            commands.draw(0..3);
+        });
+    });
+    assert_eq!(gpu.message_texts(), [""; 0]);
+    let pixels: Vec<[f32; 4]> = target.0.colors();
+    assert!(pixels.iter().all(|pixel| *pixel == [6.0; 4]));
+}

@@ -6,6 +6,7 @@ mod clock;
 mod features;
 mod instructions;
 mod kernels;
+mod newer_instructions;
 mod structured;
 
 use gaurast_workloads::kernels::Context;

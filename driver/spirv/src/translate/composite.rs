@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use isa::ir::Reg;
 use isa::op::Op as Ir;
-use spirv::{Decoration, Op};
+use spirv::Op;
 
 use super::emitter::op_for_width;
 use super::translator::Translator;
@@ -56,6 +56,12 @@ pub fn composite(t: &mut Translator, instruction: &Instruction) -> Result<()> {
                 }
             }
             t.define(instruction, regs)
+        }
+        Op::CompositeConstructReplicateEXT => {
+            let count = t.globals.types.scalars(instruction.ty()?)? as usize;
+            t.emit.charge_budget(count)?;
+            let part = t.regs(instruction.id(0)?)?;
+            t.define(instruction, part.iter().copied().cycle().take(count).collect())
         }
         Op::CompositeExtract => {
             let whole = t.regs(instruction.id(0)?)?;
@@ -146,7 +152,7 @@ pub fn matrix(t: &mut Translator, id: u32) -> Result<Matrix> {
 
 /// Translates `OpDot` and products with matrices.
 pub fn linear_algebra(t: &mut Translator, instruction: &Instruction) -> Result<()> {
-    let contract = !t.module.has(instruction.result()?, Decoration::NoContraction);
+    let contract = t.may_contract(instruction)?;
     let (first, second) = (instruction.id(0)?, instruction.id(1)?);
     let regs = match instruction.opcode {
         Op::Dot => {

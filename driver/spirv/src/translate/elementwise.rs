@@ -253,7 +253,7 @@ pub fn elementwise(t: &mut Translator, instruction: &Instruction) -> Result<()> 
 
 /// Translates `a * b`, which an addition may fuse later if that is allowed.
 fn multiply(t: &mut Translator, instruction: &Instruction) -> Result<()> {
-    let contract = t.may_contract(instruction);
+    let contract = t.may_contract(instruction)?;
     each(t, instruction, 0, 2, |t, scalars, src| {
         let scalar = scalars[0];
         let product = t.emit.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), src);
@@ -266,7 +266,7 @@ fn multiply(t: &mut Translator, instruction: &Instruction) -> Result<()> {
 
 /// Translates `a + b`, fused if one operand is a product.
 fn add(t: &mut Translator, instruction: &Instruction) -> Result<()> {
-    let contract = t.may_contract(instruction);
+    let contract = t.may_contract(instruction)?;
     each(t, instruction, 0, 2, |t, scalars, src| {
         let (scalar, a, b) = (scalars[0], src[0], src[1]);
         let find = |reg, other| Some((t.emit.product(reg)?, other));

@@ -62,6 +62,9 @@ fn is_subgroup(op: Op) -> bool {
                 | Op::SubgroupAnyKHR
                 | Op::SubgroupAllEqualKHR
                 | Op::SubgroupReadInvocationKHR
+                | Op::GroupNonUniformRotateKHR
+                | Op::GroupNonUniformQuadAllKHR
+                | Op::GroupNonUniformQuadAnyKHR
         )
 }
 
@@ -82,8 +85,11 @@ pub fn translate(t: &mut Translator, instruction: &Instruction) -> Result<()> {
         }
         Op::ArrayLength => array_length(t, instruction),
         Op::PtrEqual | Op::PtrNotEqual | Op::PtrDiff => compare_pointers(t, instruction),
-        Op::ExtInst => extended(t, instruction),
-        Op::CopyObject => {
+        Op::ExtInst | Op::ExtInstWithForwardRefsKHR => extended(t, instruction),
+        // A promise of the program's, which nothing needs.
+        Op::AssumeTrueKHR => Ok(()),
+        // The value that is expected makes no difference.
+        Op::CopyObject | Op::ExpectKHR => {
             let value = t.value(instruction.id(0)?)?;
             match value {
                 Value::Regs(regs) => t.define(instruction, regs.to_vec()),
@@ -94,6 +100,7 @@ pub fn translate(t: &mut Translator, instruction: &Instruction) -> Result<()> {
         | Op::VectorInsertDynamic
         | Op::VectorShuffle
         | Op::CompositeConstruct
+        | Op::CompositeConstructReplicateEXT
         | Op::CompositeExtract
         | Op::CompositeInsert
         | Op::CopyLogical

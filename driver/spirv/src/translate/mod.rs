@@ -38,7 +38,9 @@ mod vertex_places;
 use std::collections::HashMap;
 
 use isa::ir::{MAX_LANES, Program};
-use spirv::{AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel, StorageClass};
+use spirv::{
+    AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, FPFastMathMode, MemoryModel, StorageClass,
+};
 
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::{Globals, Specialization};
@@ -48,6 +50,7 @@ use crate::interface::{
     TransformFeedback, VertexExchange,
 };
 use crate::module::Module;
+use crate::types::Scalar;
 use analysis::Analysis;
 use control_flow::ControlFlow;
 use emitter::Emitter;
@@ -113,6 +116,7 @@ fn translate_here(
         io: InputsOutputs::new(module, &globals, &interface, options.subgroup_size),
         promoted: PromotedVariables::default(),
         interface,
+        never_contracted: never_contracted(module, &globals, entry)?,
         next_resource_slot: 0,
         workgroup_block: None,
         vertex_memory: VertexPlaces::default(),
@@ -151,6 +155,27 @@ fn execution_modes(module: &Module, globals: &Globals, entry: u32, stage: Stage)
         }
     }
     Ok(interface)
+}
+
+/// The floating-point types whose default fast-math mode forbids contraction.
+fn never_contracted(module: &Module, globals: &Globals, entry: u32) -> Result<Vec<Scalar>, Error> {
+    let mut found = Vec::new();
+    for instruction in &module.sections.execution_modes {
+        let mode = instruction.enumerant(1, ExecutionMode::from_u32);
+        if instruction.id(0).ok() != Some(entry) || mode != Some(ExecutionMode::FPFastMathDefault) {
+            continue;
+        }
+        let add = || -> Result<Option<Scalar>> {
+            let (scalar, _) = globals.types.vector(instruction.id(2)?)?;
+            let Some(bits) = globals.constant_u32(instruction.id(3)?) else {
+                return malformed("the fast-math mode isn't a constant");
+            };
+            let mode = FPFastMathMode::from_bits_truncate(bits);
+            Ok((!mode.contains(FPFastMathMode::ALLOW_CONTRACT)).then_some(scalar))
+        };
+        found.extend(add().map_err(|diagnostic| diagnostic.locate(instruction.reference()))?);
+    }
+    Ok(found)
 }
 
 /// The workgroup's size from the constant with the built-in decoration, which overrides the execution mode.
@@ -414,5 +439,10 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::ShaderClockKHR
             | C::AtomicFloat32AddEXT
             | C::AtomicFloat32MinMaxEXT
+            | C::ExpectAssumeKHR
+            | C::GroupNonUniformRotateKHR
+            | C::QuadControlKHR
+            | C::FloatControls2
+            | C::ReplicatedCompositesEXT
     )
 }

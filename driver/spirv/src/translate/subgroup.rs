@@ -75,6 +75,8 @@ pub fn subgroup(t: &mut Translator, instruction: &Instruction) -> Result<()> {
         Op::GroupNonUniformShuffleXor => move_lanes(t, instruction, SubgroupOp::ShuffleXor, first, Some(first + 1)),
         Op::GroupNonUniformShuffleUp => move_lanes(t, instruction, SubgroupOp::ShuffleUp, first, Some(first + 1)),
         Op::GroupNonUniformShuffleDown => move_lanes(t, instruction, SubgroupOp::ShuffleDown, first, Some(first + 1)),
+        Op::GroupNonUniformRotateKHR => rotate(t, instruction),
+        Op::GroupNonUniformQuadAllKHR | Op::GroupNonUniformQuadAnyKHR => quad_vote(t, instruction),
         Op::GroupNonUniformQuadBroadcast => {
             move_lanes(t, instruction, SubgroupOp::QuadBroadcast, first, Some(first + 1))
         }
@@ -131,6 +133,46 @@ fn move_lanes(
     t.define(instruction, moved)
 }
 
+/// Moves values down by a number of lanes within the subgroup, or within clusters of it; the lowest lanes' go to the
+/// highest.
+fn rotate(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let cluster = match instruction.operands.len() {
+        0..=3 => t.options.subgroup_size,
+        _ => match t.literal(instruction.id(3)?)? {
+            cluster if cluster.is_power_of_two() => cluster,
+            _ => return malformed("the cluster size isn't a power of two"),
+        },
+    };
+    let regs = t.regs(instruction.id(1)?)?;
+    let delta = t.reg(instruction.id(2)?)?;
+    let lane = t.io.subgroup_lane(&mut t.emit);
+    let (within, outside) = (t.emit.u32(cluster - 1), t.emit.u32(!(cluster - 1)));
+    let moved = t.emit.op(Ir::IAdd, &[lane, delta]);
+    let moved = t.emit.op(Ir::And, &[moved, within]);
+    let first = t.emit.op(Ir::And, &[lane, outside]);
+    let from = t.emit.op(Ir::Or, &[first, moved]);
+    let op = SubgroupOp::Shuffle;
+    let rotated = regs.iter().map(|reg| t.emit.builder.subgroup(op, Some(*reg), Some(from))).collect();
+    t.define(instruction, rotated)
+}
+
+/// Votes of the lanes of a quad that are active.
+fn quad_vote(t: &mut Translator, instruction: &Instruction) -> Result<()> {
+    let is_all = instruction.opcode == Op::GroupNonUniformQuadAllKHR;
+    let value = t.reg(instruction.id(0)?)?;
+    // All are true if none is false.
+    let value = if is_all { t.emit.op(Ir::BNot, &[value]) } else { value };
+    let words = t.emit.builder.ballot(value);
+    let lane = t.io.subgroup_lane(&mut t.emit);
+    let quad = t.emit.u32(!3);
+    let first = t.emit.op(Ir::And, &[lane, quad]);
+    let bits = ballot_from(t, &words, first);
+    let (four, zero) = (t.emit.u32(0xF), t.emit.u32(0));
+    let bits = t.emit.op(Ir::And, &[bits, four]);
+    let vote = t.emit.op(if is_all { Ir::IEq } else { Ir::INe }, &[bits, zero]);
+    t.define(instruction, vec![vote])
+}
+
 fn ballot_operand(t: &mut Translator, instruction: &Instruction, index: usize) -> Result<[Reg; 4]> {
     match *t.regs(instruction.id(index)?)? {
         [a, b, c, d] => Ok([a, b, c, d]),
@@ -140,7 +182,15 @@ fn ballot_operand(t: &mut Translator, instruction: &Instruction, index: usize) -
 
 /// A truth value: true if a bit of a ballot is set.
 fn ballot_bit(t: &mut Translator, words: &[Reg; 4], index: Reg) -> Reg {
-    let (five, one, zero) = (t.emit.u32(5), t.emit.u32(1), t.emit.u32(0));
+    let (one, zero) = (t.emit.u32(1), t.emit.u32(0));
+    let shifted = ballot_from(t, words, index);
+    let bit = t.emit.op(Ir::And, &[shifted, one]);
+    t.emit.op(Ir::INe, &[bit, zero])
+}
+
+/// The bits of a ballot's word from an index on.
+fn ballot_from(t: &mut Translator, words: &[Reg; 4], index: Reg) -> Reg {
+    let five = t.emit.u32(5);
     let which = t.emit.op(Ir::UShr, &[index, five]);
     let mut word = words[0];
     for (number, candidate) in (1..).zip(&words[1..]) {
@@ -148,9 +198,7 @@ fn ballot_bit(t: &mut Translator, words: &[Reg; 4], index: Reg) -> Reg {
         let this = t.emit.op(Ir::IEq, &[which, number]);
         word = t.emit.select(this, *candidate, word);
     }
-    let shifted = t.emit.op(Ir::UShr, &[word, index]);
-    let bit = t.emit.op(Ir::And, &[shifted, one]);
-    t.emit.op(Ir::INe, &[bit, zero])
+    t.emit.op(Ir::UShr, &[word, index])
 }
 
 /// A ballot's words without the bits above the subgroup's.

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use isa::ir::{Binding, Reg, Space};
 use isa::op::Op as Ir;
-use spirv::{Decoration, StorageClass};
+use spirv::{Decoration, FPFastMathMode, StorageClass};
 
 use super::analysis::Analysis;
 use super::emitter::Emitter;
@@ -31,6 +31,8 @@ pub struct Translator<'a> {
     pub io: InputsOutputs<'a>,
     pub promoted: PromotedVariables,
     pub interface: Interface,
+    /// Floating-point types whose operations are not contracted unless their decorations allow it.
+    pub never_contracted: Vec<Scalar>,
     pub next_resource_slot: u32,
     /// The place of the blocks in workgroup memory, once allocated.
     pub workgroup_block: Option<u32>,
@@ -184,10 +186,26 @@ impl Translator<'_> {
         }
     }
 
-    /// Reports whether an instruction's product and sum may be fused.
-    pub fn may_contract(&self, instruction: &Instruction) -> bool {
-        let id = instruction.result_id.unwrap_or(0);
-        !self.module.has(id, Decoration::NoContraction)
+    /// Reports whether an instruction's product and sum may be fused: by its own decorations, or else by the entry
+    /// point's default for its type.
+    pub fn may_contract(&self, instruction: &Instruction) -> Result<bool> {
+        let id = instruction.result()?;
+        if self.module.has(id, Decoration::NoContraction) {
+            return Ok(false);
+        }
+        if let Some(mode) = self.module.fast_math(id) {
+            return Ok(mode.contains(FPFastMathMode::ALLOW_CONTRACT));
+        }
+        if self.never_contracted.is_empty() {
+            return Ok(true);
+        }
+        let ty = instruction.ty()?;
+        let types = &self.globals.types;
+        let scalar = match types.matrix(ty) {
+            Ok((_, _, _, scalar)) => scalar,
+            Err(_) => types.vector(ty)?.0,
+        };
+        Ok(!self.never_contracted.contains(&scalar))
     }
 
     /// Creates a variable of a type that is held in registers. Returns its number.

@@ -3,7 +3,7 @@
 
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
-use crate::command::DrawParameters;
+use crate::command::{DrawParameters, IndexBuffer};
 use crate::physical_device::limits::MAX_GAUSSIANS;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
@@ -170,7 +170,8 @@ pub(super) fn indices(state: &State, draw: &DrawParameters) -> Result<Option<Ind
         return Ok(None);
     };
     let bound = state.index_buffer.as_ref().ok_or(DrawError::IndexBuffer)?;
-    Ok(Some(IndexStream { buffer: bound.range.clone(), index_size: bound.index_size, vertex_offset }))
+    let IndexBuffer { range, index_size, restart } = bound;
+    Ok(Some(IndexStream { buffer: range.clone(), index_size: *index_size, vertex_offset, restart: *restart }))
 }
 
 /// The packet of one draw.

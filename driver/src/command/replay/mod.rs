@@ -94,6 +94,11 @@ fn execute(command: &Command, state: &mut State, execution: &mut Execution<'_>) 
             *slot(&mut state.vertex_buffers, *binding) = Some(buffer.clone());
         }
         Command::BindIndexBuffer(buffer) => state.index_buffer = Some(buffer.clone()),
+        Command::SetPrimitiveRestartIndex(index) => {
+            if let Some(bound) = &mut state.index_buffer {
+                bound.restart = Some(*index);
+            }
+        }
         Command::SetViewport { index, viewport } => {
             *slot(&mut state.viewports, *index) = Some(*viewport);
             state.draw_state = None;

@@ -93,7 +93,8 @@ impl ResolveStage {
             let is_needed = draw.alpha_to_coverage || draw.alpha_to_one;
             return is_needed.then(|| Self::passing(device, fixed)).transpose();
         };
-        let fragment = stages::translate(device, layout(graphics)?, stage, Stage::Fragment, draw.samples)?;
+        let mut fragment = stages::translate(device, layout(graphics)?, stage, Stage::Fragment, draw.samples)?;
+        stages::place_outputs(&mut fragment, &graphics.fragment_output.color_locations);
         let varyings = varyings(state)?;
         check_resolve(&fragment.interface, &varyings)?;
         let resources = ProgramResources::new(device, &fragment.interface);

@@ -100,8 +100,12 @@ mod tests {
         let memory = Allocation::new(16, true).expect("memory");
         let indices: [u32; 4] = [7, 5, 3, 1];
         memory.write(0, &indices).expect("it fits");
-        let stream =
-            IndexStream { buffer: BufferRange { memory, offset: 0, size: 16 }, index_size: 4, vertex_offset: -1 };
+        let stream = IndexStream {
+            buffer: BufferRange { memory, offset: 0, size: 16 },
+            index_size: 4,
+            vertex_offset: -1,
+            restart: None,
+        };
         let origin =
             |start, first, count, first_instance, indices| Origin { start, first, count, first_instance, indices };
         let origins = Origins(vec![origin(0, 10, 3, 4, None), origin(6, 1, 2, 0, Some(stream))]);

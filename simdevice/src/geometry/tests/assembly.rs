@@ -134,7 +134,9 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     for topology in TOPOLOGIES {
-        for (index_size, restart) in [(1, 0xFF), (2, 0xFFFF), (4, u32::MAX)] {
+        for (index_size, restart, own) in
+            [(1, 0xFF, None), (2, 0xFFFF, None), (4, u32::MAX, None), (1, 11, Some(11)), (4, 5, Some(5))]
+        {
             for restarts in [false, true] {
                 let mut draw = draw(&device, topology, &positions(100));
                 let mut state = state(topology);
@@ -154,7 +156,7 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
                     2 => buffer(&list.iter().map(|&i| i as u16).collect::<Vec<_>>()),
                     _ => buffer(&list),
                 };
-                draw.indices = Some(IndexStream { buffer, index_size, vertex_offset: 7 });
+                draw.indices = Some(IndexStream { buffer, index_size, vertex_offset: 7, restart: own });
                 (draw.first, draw.count) = (2, 85);
                 (draw.first_instance, draw.instance_count) = (5, 2);
                 let runs: Vec<Vec<u32>> = list[2..87]

@@ -5,7 +5,7 @@ use super::scene::*;
 use crate::packet::*;
 use crate::program::interface::VertexOutput;
 
-use crate::state::{DepthBias, DrawState, PolygonMode, Topology, Viewport};
+use crate::state::{DepthBias, DepthBiasUnit, DrawState, PolygonMode, Topology, Viewport};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -41,8 +41,12 @@ fn wild_numbers_are_survived() {
         }
         draw_state.depth_clamp = rng.random();
         draw_state.samples = [1, 4][rng.random_range(0..2)];
-        draw_state.depth_bias =
-            Some(DepthBias { constant: wild(&mut rng), clamp: wild(&mut rng), slope: wild(&mut rng) });
+        draw_state.depth_bias = Some(DepthBias {
+            constant: wild(&mut rng),
+            unit: DepthBiasUnit::DEFAULT,
+            clamp: wild(&mut rng),
+            slope: wild(&mut rng),
+        });
         if rng.random_bool(0.5) {
             draw_state.viewports[0] = Viewport {
                 x: wild(&mut rng),

@@ -129,7 +129,7 @@ pub fn stream<T: bytemuck::NoUninit>(elements: &[T], format: Format) -> Attribut
 
 /// An index buffer of 32-bit indices.
 pub fn indices(elements: &[u32]) -> IndexStream {
-    IndexStream { buffer: buffer(elements), index_size: 4, vertex_offset: 0 }
+    IndexStream { buffer: buffer(elements), index_size: 4, vertex_offset: 0, restart: None }
 }
 
 /// A draw of these positions with the programs of [`programs`].

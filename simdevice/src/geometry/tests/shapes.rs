@@ -2,7 +2,7 @@
 
 use super::super::PrimitiveKind;
 use crate::program::interface::VertexOutput;
-use crate::state::{DepthBias, PolygonMode, Topology};
+use crate::state::{DepthBias, DepthBiasUnit, PolygonMode, Topology};
 
 use super::scene::*;
 
@@ -128,11 +128,20 @@ fn depth_bias_follows_the_specification() {
         let found = run(&device, &draw_with(&device, programs(&[]), draw_state, positions));
         found.primitives[0].depth[0]
     };
-    let bias = |constant, slope, clamp| DepthBias { constant, clamp, slope };
+    let bias = |constant, slope, clamp| DepthBias { constant, clamp, slope, unit: DepthBiasUnit::DEFAULT };
     // The greatest depth has exponent -1: a unit is 2^-24.
     assert_eq!(depth_of(bias(1000.0, 0.0, 0.0), &positions), 0.75 + 1000.0 / 16_777_216.0);
     assert!((depth_of(bias(0.0, 2.0, 0.0), &positions) - 0.755).abs() < 1e-6);
     assert!((depth_of(bias(0.0, 2.0, 0.001), &positions) - 0.751).abs() < 1e-6);
     assert!((depth_of(bias(0.0, -2.0, -0.001), &positions) - 0.749).abs() < 1e-6);
     assert!((depth_of(bias(0.0, -2.0, 0.001), &positions) - 0.745).abs() < 1e-6);
+    // Units that don't depend on the depth: those of 24 bits, and 1.
+    let far = positions.map(|[x, y, z, w]| [x, y, z / 16.0, w]);
+    let of_unit = |constant, unit| depth_of(DepthBias { unit, ..bias(constant, 0.0, 0.0) }, &far) - 0.75 / 16.0;
+    let exactly = |unit: fn(bool) -> DepthBiasUnit| [unit(false), unit(true)];
+    let of_format = exactly(|is_exact| DepthBiasUnit::Format { is_exact });
+    assert_eq!(of_format.map(|unit| of_unit(1024.0, unit)), [2f32.powi(-18); 2]);
+    let of_fixed_point = exactly(|is_exact| DepthBiasUnit::FixedPoint { is_exact });
+    assert_eq!(of_fixed_point.map(|unit| of_unit(1024.0, unit)), [2f32.powi(-13), 2f32.powi(-14)]);
+    assert_eq!(of_unit(0.25, DepthBiasUnit::One), 0.25);
 }
