@@ -13,6 +13,7 @@ pub mod level;
 mod lookup;
 mod memory;
 mod runs;
+pub mod shared;
 
 #[doc(hidden)]
 pub use fearless_simd;
