@@ -17,6 +17,7 @@
 //! | [`shapes`] | vertices of shapes that scenes draw |
 //! | [`drawn`] | scenes that this driver and lavapipe draw |
 //! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
+//! | [`sharing`] | memory, semaphores and fences that devices and processes share |
 //! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
 //! | [`presenter`] | a device that presents to a surface |
 //! | [`texels`], [`exact_lavapipe`] | random texels, and a lavapipe that samples them as accurately as it can |
@@ -50,6 +51,7 @@ pub mod scene;
 pub mod settings;
 pub mod shader;
 pub mod shapes;
+pub mod sharing;
 pub mod stage_program;
 pub mod target;
 pub mod texels;
