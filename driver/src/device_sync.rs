@@ -2,6 +2,9 @@
 //! variable, so that a wait for any of several is simple, and losing the device wakes every waiter.
 
 use crate::abi::error::Error;
+use simdevice::shared;
+use std::os::fd::BorrowedFd;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -24,6 +27,58 @@ pub(crate) enum WaitResult {
     TimedOut,
     /// The device was lost before the condition was met.
     Lost,
+}
+
+/// A place where others than the device change what is waited for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Outside<'a> {
+    /// A word in memory that processes share, which is woken at changes.
+    Word(&'a AtomicU32),
+    /// A file that becomes readable.
+    File(BorrowedFd<'a>),
+    /// Several places, or a place and values of the device.
+    Several,
+}
+
+impl Outside<'_> {
+    /// The longest time in which a waiter does not notice that the device is lost.
+    const LOSS: Duration = Duration::from_millis(10);
+
+    /// The time between looks at several places.
+    const LOOK: Duration = Duration::from_micros(200);
+
+    /// Waits for a change since the word was `seen`, or for `time`; may return early.
+    fn wait(self, seen: u32, time: Duration) {
+        match self {
+            Self::Word(word) => shared::wait(word, seen, time.min(Self::LOSS)),
+            Self::File(file) => wait_for_file(file, time.min(Self::LOSS)),
+            Self::Several => std::thread::sleep(time.min(Self::LOOK)),
+        }
+    }
+
+    /// The word, before one looks at what it is for.
+    fn seen(self) -> u32 {
+        match self {
+            Self::Word(word) => word.load(Ordering::Acquire),
+            Self::File(_) | Self::Several => 0,
+        }
+    }
+}
+
+/// Waits until a file is readable, at most for `time`.
+fn wait_for_file(file: BorrowedFd<'_>, time: Duration) {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::event::{PollFd, PollFlags, Timespec, poll};
+        let time = Timespec::try_from(time).ok();
+        // Every result has the caller look again.
+        let _ = poll(&mut [PollFd::from_borrowed_fd(file, PollFlags::IN)], time.as_ref());
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = file;
+        std::thread::sleep(time.min(Outside::LOOK));
+    }
 }
 
 impl DeviceSync {
@@ -77,6 +132,32 @@ impl DeviceSync {
                     self.changed.wait_timeout(guard, left).unwrap_or_else(PoisonError::into_inner).0
                 }
             };
+        }
+    }
+
+    /// Waits as [`Self::wait`] for what others than the device may change, who are `outside`.
+    pub(crate) fn wait_for(
+        &self,
+        deadline: Option<Instant>,
+        outside: Option<Outside<'_>>,
+        ready: impl Fn() -> bool,
+    ) -> WaitResult {
+        let Some(outside) = outside else {
+            return self.wait(deadline, ready);
+        };
+        loop {
+            let seen = outside.seen();
+            if ready() {
+                return WaitResult::Ready;
+            }
+            if self.lost.get().is_some() {
+                return WaitResult::Lost;
+            }
+            let left = deadline.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
+            if left.is_zero() {
+                return WaitResult::TimedOut;
+            }
+            outside.wait(seen, left);
         }
     }
 }

@@ -1,13 +1,18 @@
-//! Fences, semaphores and events.
+//! Fences, semaphores and events, and the handles by which fences and semaphores are shared.
 
 use crate::abi::error::Error;
 use crate::abi::handle::objects;
 use crate::abi::sanitizer::{acquire, release};
 use crate::device::Device;
 use crate::device_sync::{DeviceSync, WaitResult, deadline};
+use crate::external::{self, Kind};
+use crate::payload::{Payload, Payloads, outside};
+use crate::physical_device::external::{shares_fences, shares_semaphores};
 use ash::vk;
+use simdevice::host;
+use std::ffi::c_int;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 objects! {
     vk::Fence => Fence;
@@ -19,33 +24,26 @@ objects! {
 #[derive(Debug)]
 pub(crate) struct Fence {
     sync: Arc<DeviceSync>,
-    signaled: AtomicBool,
+    payloads: Payloads,
+    exports: vk::ExternalFenceHandleTypeFlags,
 }
 
 impl Fence {
-    /// A fence, signaled or not.
-    pub(crate) fn new(sync: Arc<DeviceSync>, signaled: bool) -> Self {
-        Self { sync, signaled: AtomicBool::new(signaled) }
-    }
-
-    /// Reports whether it is signaled.
-    pub(crate) fn is_signaled(&self) -> bool {
-        let is_signaled = self.signaled.load(Ordering::Acquire);
-        if is_signaled {
-            acquire(self);
-        }
-        is_signaled
+    /// Its payload.
+    pub(crate) fn payloads(&self) -> &Payloads {
+        &self.payloads
     }
 
     /// Signals the fence.
     pub(crate) fn signal(&self) {
-        release(self);
-        self.sync.update(|| self.signaled.store(true, Ordering::Release));
+        self.payloads.current().signal(0);
     }
 
-    /// Resets the fence.
-    pub(crate) fn reset(&self) {
-        self.signaled.store(false, Ordering::Release);
+    /// Resets the fence. An import that is temporary ends.
+    fn reset(&self) {
+        if let (payload, false) = self.payloads.take() {
+            payload.reset();
+        }
     }
 }
 
@@ -53,67 +51,25 @@ impl Fence {
 #[derive(Debug)]
 pub(crate) struct Semaphore {
     sync: Arc<DeviceSync>,
-    payload: Payload,
-}
-
-#[derive(Debug)]
-enum Payload {
-    Binary(AtomicBool),
-    Timeline(AtomicU64),
+    payloads: Payloads,
+    is_timeline: bool,
+    exports: vk::ExternalSemaphoreHandleTypeFlags,
 }
 
 impl Semaphore {
-    /// An unsignaled binary semaphore.
-    pub(crate) fn new_binary(sync: Arc<DeviceSync>) -> Self {
-        Self { sync, payload: Payload::Binary(AtomicBool::new(false)) }
-    }
-
-    /// A timeline semaphore with an initial value.
-    pub(crate) fn new_timeline(sync: Arc<DeviceSync>, value: u64) -> Self {
-        Self { sync, payload: Payload::Timeline(AtomicU64::new(value)) }
-    }
-
-    /// The value of a timeline semaphore; `None` for a binary one.
-    pub(crate) fn value(&self) -> Option<u64> {
-        match &self.payload {
-            Payload::Binary(_) => None,
-            Payload::Timeline(value) => {
-                let value = value.load(Ordering::Acquire);
-                acquire(self);
-                Some(value)
-            }
-        }
+    /// Its payload.
+    pub(crate) fn payloads(&self) -> &Payloads {
+        &self.payloads
     }
 
     /// Signals the semaphore; a timeline semaphore gets `value`.
     pub(crate) fn signal(&self, value: u64) {
-        release(self);
-        self.sync.update(|| match &self.payload {
-            Payload::Binary(signaled) => signaled.store(true, Ordering::Release),
-            // A smaller value is the application's error; a timeline never decreases.
-            Payload::Timeline(current) => {
-                current.fetch_max(value, Ordering::AcqRel);
-            }
-        });
+        self.payloads.current().signal(value);
     }
 
-    /// Reports whether a wait for `value` (which a binary semaphore ignores) has ended.
-    pub(crate) fn is_reached(&self, value: u64) -> bool {
-        let is_reached = match &self.payload {
-            Payload::Binary(signaled) => signaled.load(Ordering::Acquire),
-            Payload::Timeline(current) => current.load(Ordering::Acquire) >= value,
-        };
-        if is_reached {
-            acquire(self);
-        }
-        is_reached
-    }
-
-    /// Ends a queue's wait: a binary semaphore becomes unsignaled.
-    pub(crate) fn consume(&self) {
-        if let Payload::Binary(signaled) = &self.payload {
-            signaled.store(false, Ordering::Release);
-        }
+    /// The object that its files are of.
+    fn kind(&self) -> Kind {
+        if self.is_timeline { Kind::TimelineSemaphore } else { Kind::BinarySemaphore }
     }
 }
 
@@ -156,7 +112,7 @@ fn wait_result(waited: WaitResult, loss: impl FnOnce() -> Result<(), Error>) -> 
 }
 
 fn timeline_value(semaphore: &Semaphore) -> Result<u64, Error> {
-    semaphore.value().ok_or_else(|| {
+    semaphore.payloads.current().value().ok_or_else(|| {
         Error::usage(
             "VUID-vkGetSemaphoreCounterValue-semaphore-03255",
             "the semaphore is binary, but the command takes a timeline semaphore",
@@ -165,9 +121,26 @@ fn timeline_value(semaphore: &Semaphore) -> Result<u64, Error> {
 }
 
 #[doc(alias = "vkCreateFence")]
-pub(crate) fn create_fence(device: &Device, create_info: &vk::FenceCreateInfo<'_>) -> Result<Arc<Fence>, Error> {
-    let signaled = create_info.flags.contains(vk::FenceCreateFlags::SIGNALED);
-    Ok(Arc::new(Fence::new(Arc::clone(device.sync()), signaled)))
+pub(crate) fn create_fence(
+    device: &Device,
+    create_info: &vk::FenceCreateInfo<'_>,
+    exports: Option<&vk::ExportFenceCreateInfo<'_>>,
+) -> Result<Arc<Fence>, Error> {
+    let sync = device.sync();
+    let is_signaled = create_info.flags.contains(vk::FenceCreateFlags::SIGNALED);
+    let exports = exports.map_or_else(Default::default, |exports| exports.handle_types);
+    if !exports.is_empty() && !shares_fences(exports) {
+        return Err(Error::usage(
+            "VUID-VkExportFenceCreateInfo-handleTypes-01446",
+            format!("a fence cannot have handles of types {exports:?}: it can have opaque or sync file descriptors"),
+        ));
+    }
+    let payload = if exports == vk::ExternalFenceHandleTypeFlags::OPAQUE_FD {
+        Payload::shared(sync, Kind::Fence, is_signaled.into())?
+    } else {
+        Payload::binary(sync, is_signaled)
+    };
+    Ok(Arc::new(Fence { sync: Arc::clone(sync), payloads: Payloads::new(payload), exports }))
 }
 
 #[doc(alias = "vkResetFences")]
@@ -178,7 +151,7 @@ pub(crate) fn reset_fences(fences: &[Arc<Fence>]) -> Result<(), Error> {
 
 #[doc(alias = "vkGetFenceStatus")]
 pub(crate) fn get_fence_status(device: &Device, fence: &Fence) -> Result<vk::Result, Error> {
-    if fence.is_signaled() {
+    if fence.payloads.current().is_reached(0) {
         return Ok(vk::Result::SUCCESS);
     }
     device.sync().check()?;
@@ -193,8 +166,9 @@ pub(crate) fn wait_for_fences(
     timeout: u64,
 ) -> Result<vk::Result, Error> {
     let sync = device.sync();
-    let waited = sync.wait(deadline(timeout), || {
-        let mut signaled = fences.iter().map(|fence| fence.is_signaled());
+    let payloads = host::collect(fences.iter().map(|fence| fence.payloads.current()));
+    let waited = sync.wait_for(deadline(timeout), outside(&payloads), || {
+        let mut signaled = payloads.iter().map(|payload| payload.is_reached(0));
         if wait_all { signaled.all(|s| s) } else { signaled.any(|s| s) }
     });
     wait_result(waited, || sync.check())
@@ -206,16 +180,28 @@ pub(crate) fn create_semaphore(
     exports: Option<&vk::ExportSemaphoreCreateInfo<'_>>,
     kind: Option<&vk::SemaphoreTypeCreateInfo<'_>>,
 ) -> Result<Arc<Semaphore>, Error> {
-    let sync = Arc::clone(device.sync());
-    if exports.is_some_and(|export| !export.handle_types.is_empty()) {
-        return Err(Error::FeatureNotPresent("exporting semaphores".into()));
+    let sync = device.sync();
+    let initial = kind.filter(|kind| kind.semaphore_type == vk::SemaphoreType::TIMELINE).map(|kind| kind.initial_value);
+    let is_timeline = initial.is_some();
+    let exports = exports.map_or_else(Default::default, |exports| exports.handle_types);
+    if !exports.is_empty() && !shares_semaphores(exports, is_timeline) {
+        return Err(Error::usage(
+            "VUID-VkExportSemaphoreCreateInfo-handleTypes-01124",
+            format!(
+                "a semaphore cannot have handles of types {exports:?}: a binary one can have opaque or sync file \
+                 descriptors, a timeline opaque ones"
+            ),
+        ));
     }
-    Ok(Arc::new(match kind {
-        Some(kind) if kind.semaphore_type == vk::SemaphoreType::TIMELINE => {
-            Semaphore::new_timeline(sync, kind.initial_value)
+    let payload = match initial {
+        _ if exports == vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD => {
+            let kind = if is_timeline { Kind::TimelineSemaphore } else { Kind::BinarySemaphore };
+            Payload::shared(sync, kind, initial.unwrap_or(0))?
         }
-        _ => Semaphore::new_binary(sync),
-    }))
+        Some(value) => Payload::timeline(sync, value),
+        None => Payload::binary(sync, false),
+    };
+    Ok(Arc::new(Semaphore { sync: Arc::clone(sync), payloads: Payloads::new(payload), is_timeline, exports }))
 }
 
 #[doc(alias = "vkGetSemaphoreCounterValue")]
@@ -237,8 +223,9 @@ pub(crate) fn wait_semaphores(
         timeline_value(semaphore)?;
     }
     let any = flags.contains(vk::SemaphoreWaitFlags::ANY);
-    let waited = sync.wait(deadline(timeout), || {
-        let mut reached = semaphores.iter().zip(values).map(|(s, &value)| s.is_reached(value));
+    let payloads = host::collect(semaphores.iter().map(|semaphore| semaphore.payloads.current()));
+    let waited = sync.wait_for(deadline(timeout), outside(&payloads), || {
+        let mut reached = payloads.iter().zip(values).map(|(payload, &value)| payload.is_reached(value));
         if any { reached.any(|r| r) } else { reached.all(|r| r) }
     });
     wait_result(waited, || sync.check())
@@ -249,6 +236,138 @@ pub(crate) fn signal_semaphore(semaphore: &Semaphore, value: u64) -> Result<(), 
     timeline_value(semaphore)?;
     semaphore.signal(value);
     Ok(())
+}
+
+/// The export of a payload that has no file: the object was not created for handles of the type, or holds an import of
+/// another type.
+fn not_exported(rule: &'static str, handle_type: impl std::fmt::Debug) -> Error {
+    Error::usage(rule, format!("the object's payload has no handles of type {handle_type:?}"))
+}
+
+/// The export of a sync file that nothing would signal.
+fn never_signaled(rule: &'static str) -> Error {
+    Error::usage(rule, "a sync file is exported that nothing submitted will signal")
+}
+
+#[doc(alias = "vkGetSemaphoreFdKHR")]
+pub(crate) fn get_semaphore_fd(
+    semaphore: &Semaphore,
+    handle_type: vk::ExternalSemaphoreHandleTypeFlags,
+) -> Result<c_int, Error> {
+    use vk::ExternalSemaphoreHandleTypeFlags as Types;
+    let payload = semaphore.payloads.current();
+    match handle_type {
+        Types::OPAQUE_FD => match payload.file() {
+            Some(file) => external::export(file),
+            None => Err(not_exported("VUID-VkSemaphoreGetFdInfoKHR-handleType-01132", handle_type)),
+        },
+        Types::SYNC_FD if payload.has_sync_file(semaphore.exports.contains(handle_type)) => {
+            let fd = payload.export_sync_file()?;
+            let fd = fd.ok_or_else(|| never_signaled("VUID-VkSemaphoreGetFdInfoKHR-handleType-01135"))?;
+            // The export is a wait, too.
+            if let (_, false) = semaphore.payloads.take() {
+                semaphore.payloads.replace(Payload::binary(&semaphore.sync, false), false);
+            }
+            Ok(fd)
+        }
+        _ => Err(not_exported("VUID-VkSemaphoreGetFdInfoKHR-handleType-01132", handle_type)),
+    }
+}
+
+#[doc(alias = "vkImportSemaphoreFdKHR")]
+pub(crate) fn import_semaphore_fd(
+    semaphore: &Semaphore,
+    flags: vk::SemaphoreImportFlags,
+    handle_type: vk::ExternalSemaphoreHandleTypeFlags,
+    fd: c_int,
+) -> Result<(), Error> {
+    use vk::ExternalSemaphoreHandleTypeFlags as Types;
+    let is_temporary = flags.contains(vk::SemaphoreImportFlags::TEMPORARY);
+    let payload = match handle_type {
+        Types::OPAQUE_FD if is_temporary && semaphore.is_timeline => {
+            return Err(Error::usage(
+                "VUID-VkImportSemaphoreFdInfoKHR-flags-03323",
+                "a timeline semaphore is imported temporarily",
+            ));
+        }
+        Types::OPAQUE_FD => Payload::import(&semaphore.sync, semaphore.kind(), fd)?,
+        Types::SYNC_FD if !is_temporary => {
+            return Err(Error::usage(
+                "VUID-VkImportSemaphoreFdInfoKHR-handleType-07307",
+                "a sync file is imported without VK_SEMAPHORE_IMPORT_TEMPORARY_BIT",
+            ));
+        }
+        Types::SYNC_FD if !semaphore.is_timeline => Payload::import_sync_file(&semaphore.sync, fd)?,
+        _ => {
+            return Err(Error::usage(
+                "VUID-VkImportSemaphoreFdInfoKHR-handleType-01143",
+                format!("the semaphore cannot be imported by a handle of type {handle_type:?}"),
+            ));
+        }
+    };
+    semaphore.payloads.replace(payload, is_temporary);
+    take_descriptor(fd);
+    Ok(())
+}
+
+#[doc(alias = "vkGetFenceFdKHR")]
+pub(crate) fn get_fence_fd(fence: &Fence, handle_type: vk::ExternalFenceHandleTypeFlags) -> Result<c_int, Error> {
+    use vk::ExternalFenceHandleTypeFlags as Types;
+    let payload = fence.payloads.current();
+    match handle_type {
+        Types::OPAQUE_FD => match payload.file() {
+            Some(file) => external::export(file),
+            None => Err(not_exported("VUID-VkFenceGetFdInfoKHR-handleType-01453", handle_type)),
+        },
+        Types::SYNC_FD if payload.has_sync_file(fence.exports.contains(handle_type)) => {
+            let fd = payload.export_sync_file()?;
+            let fd = fd.ok_or_else(|| never_signaled("VUID-VkFenceGetFdInfoKHR-handleType-01454"))?;
+            // The export is a reset, too; what is submitted signals the file alone.
+            if let (_, false) = fence.payloads.take() {
+                fence.payloads.replace(Payload::binary(&fence.sync, false), false);
+            }
+            Ok(fd)
+        }
+        _ => Err(not_exported("VUID-VkFenceGetFdInfoKHR-handleType-01453", handle_type)),
+    }
+}
+
+#[doc(alias = "vkImportFenceFdKHR")]
+pub(crate) fn import_fence_fd(
+    fence: &Fence,
+    flags: vk::FenceImportFlags,
+    handle_type: vk::ExternalFenceHandleTypeFlags,
+    fd: c_int,
+) -> Result<(), Error> {
+    use vk::ExternalFenceHandleTypeFlags as Types;
+    let is_temporary = flags.contains(vk::FenceImportFlags::TEMPORARY);
+    let payload = match handle_type {
+        Types::OPAQUE_FD => Payload::import(&fence.sync, Kind::Fence, fd)?,
+        Types::SYNC_FD if !is_temporary => {
+            return Err(Error::usage(
+                "VUID-VkImportFenceFdInfoKHR-handleType-07306",
+                "a sync file is imported without VK_FENCE_IMPORT_TEMPORARY_BIT",
+            ));
+        }
+        Types::SYNC_FD => Payload::import_sync_file(&fence.sync, fd)?,
+        _ => {
+            return Err(Error::usage(
+                "VUID-VkImportFenceFdInfoKHR-handleType-01464",
+                format!("a fence cannot be imported by a handle of type {handle_type:?}"),
+            ));
+        }
+    };
+    fence.payloads.replace(payload, is_temporary);
+    take_descriptor(fd);
+    Ok(())
+}
+
+/// Closes a descriptor that has been imported; -1 is none.
+fn take_descriptor(fd: c_int) {
+    if fd >= 0 {
+        // SAFETY: an import gives an open descriptor to the driver, which has used it.
+        unsafe { external::close(fd) };
+    }
 }
 
 #[doc(alias = "vkCreateEvent")]

@@ -37,7 +37,7 @@ pub mod transform_feedback;
 
 pub use command_processor::CommandProcessor;
 pub use device::Device;
-pub use devmem::{Allocation, BufferRange, host};
+pub use devmem::{Allocation, BufferRange, host, shared};
 pub use format::Format;
 pub use image::{Image, ImageView};
 pub use isa;

@@ -58,6 +58,12 @@ pub(crate) enum Error {
     /// Memory that can't be mapped.
     #[error("memory cannot be mapped: {0}")]
     MemoryMapFailed(String),
+    /// A handle of another process, device or host that can't be imported.
+    #[error("{0}")]
+    InvalidExternalHandle(String),
+    /// The process has no file descriptor left.
+    #[error("no file descriptor is left: {0}")]
+    TooManyObjects(String),
     /// A trace of work that could not be written.
     #[error("{0}")]
     TraceNotWritten(String),
@@ -116,6 +122,8 @@ impl Error {
             Self::SurfaceLost(_) => vk::Result::ERROR_SURFACE_LOST_KHR,
             Self::NativeWindowInUse => vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR,
             Self::MemoryMapFailed(_) => vk::Result::ERROR_MEMORY_MAP_FAILED,
+            Self::InvalidExternalHandle(_) => vk::Result::ERROR_INVALID_EXTERNAL_HANDLE,
+            Self::TooManyObjects(_) => vk::Result::ERROR_TOO_MANY_OBJECTS,
             Self::LayerNotPresent(_) => vk::Result::ERROR_LAYER_NOT_PRESENT,
             Self::ExtensionNotPresent(_) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,
             Self::FormatNotSupported(_) => vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
@@ -132,6 +140,7 @@ impl Error {
             Self::NullPointer { .. } => "GAURAST-null-pointer",
             Self::Unsupported { .. } => "GAURAST-unsupported-command",
             Self::InvalidShader(_) => "GAURAST-invalid-shader",
+            Self::InvalidExternalHandle(_) => "GAURAST-invalid-external-handle",
             Self::DeviceLost(_) => "GAURAST-device-lost",
             Self::Panic(_) | Self::DeviceLostByDefect(_) => "GAURAST-driver-defect",
             _ => "GAURAST-error",

@@ -8,32 +8,33 @@ use crate::abi::handle;
 use crate::abi::valid;
 use crate::device_sync::DeviceSync;
 use crate::instance::Instance;
+use crate::payload::Payload;
 use crate::queue::Queue;
 use crate::sync::{Fence, Semaphore};
 use ash::vk;
-use simdevice::CommandProcessor;
+use simdevice::{CommandProcessor, host};
 use std::sync::Arc;
 
 /// The commands of a command buffer at its submission.
 pub(crate) type Commands = (Arc<Vec<Command>>, PendingUse);
 
-/// A batch: semaphores to wait for, command buffers, semaphores to signal. Each semaphore has a timeline's value.
+/// A batch: payloads of semaphores to wait for, command buffers, payloads to signal. Each payload has a timeline's value.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
-    /// The semaphores that are waited for first.
-    pub(crate) waits: Vec<(Arc<Semaphore>, u64)>,
+    /// The payloads that are waited for first.
+    pub(crate) waits: Vec<(Arc<Payload>, u64)>,
     /// The command buffers that are executed.
     pub(crate) commands: Vec<Commands>,
-    /// The semaphores that are signaled last.
-    pub(crate) signals: Vec<(Arc<Semaphore>, u64)>,
+    /// The payloads that are signaled last.
+    pub(crate) signals: Vec<(Arc<Payload>, u64)>,
 }
 
 /// One `vkQueueSubmit`.
 pub(crate) struct Submission {
     /// Its batches.
     pub(crate) batches: Vec<Batch>,
-    /// The fence that is signaled when all of them are done.
-    pub(crate) fence: Option<Arc<Fence>>,
+    /// The payload of the fence that is signaled when all of them are done.
+    pub(crate) fence: Option<Arc<Payload>>,
     /// The state that can be waited for on the device, and its loss.
     pub(crate) sync: Arc<DeviceSync>,
     /// The instance, to which errors are reported.
@@ -61,22 +62,23 @@ impl Submission {
             }
         }
         if let Some(fence) = self.fence {
-            fence.signal();
+            fence.end_signal(0);
         }
     }
 }
 
 fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Error> {
-    for (semaphore, value) in &batch.waits {
-        execution.wait(|| semaphore.is_reached(*value))?;
-        semaphore.consume();
+    for (payload, value) in &batch.waits {
+        execution.wait(payload.outside(), || payload.is_reached(*value))?;
+        // A wait for a binary semaphore unsignals it.
+        payload.reset();
     }
     for (commands, pending) in batch.commands {
         replay(&commands, execution)?;
         drop(pending);
     }
-    for (semaphore, value) in &batch.signals {
-        semaphore.signal(*value);
+    for (payload, value) in &batch.signals {
+        payload.end_signal(*value);
     }
     Ok(())
 }
@@ -86,7 +88,7 @@ fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Erro
 /// # Errors
 /// [`Error::DeviceLost`].
 pub(crate) fn enqueue(queue: &Queue, batches: Vec<Batch>, fence: Option<&Arc<Fence>>) -> Result<(), Error> {
-    let fence = fence.cloned();
+    let fence = fence.map(|fence| fence.payloads().submit_signal());
     let submission =
         Submission { batches, fence, sync: Arc::clone(queue.sync()), instance: Arc::clone(queue.instance()) };
     queue.submit(Box::new(move |processor| submission.execute(processor)))
@@ -111,17 +113,27 @@ unsafe fn batch(info: &vk::SubmitInfo<'_>) -> Result<Batch, Error> {
         let signals = valid::slice(info.p_signal_semaphores, info.signal_semaphore_count)?;
         let command_buffers = valid::slice(info.p_command_buffers, info.command_buffer_count)?;
         Ok(Batch {
-            waits: with_values(handle::get_all(waits)?, wait_values),
+            waits: with_values(waited(&handle::get_all(waits)?), wait_values),
             commands: commands(command_buffers.iter().copied())?,
-            signals: with_values(handle::get_all(signals)?, signal_values),
+            signals: with_values(signaled(&handle::get_all(signals)?), signal_values),
         })
     }
 }
 
-/// Pairs semaphores with timeline values; binary semaphores need none.
-fn with_values(semaphores: Vec<Arc<Semaphore>>, values: &[u64]) -> Vec<(Arc<Semaphore>, u64)> {
+/// The payloads of semaphores that a batch waits for. Imports that are temporary end here.
+pub(crate) fn waited(semaphores: &[Arc<Semaphore>]) -> Vec<Arc<Payload>> {
+    host::collect(semaphores.iter().map(|semaphore| semaphore.payloads().take().0))
+}
+
+/// The payloads of semaphores that a batch signals.
+fn signaled(semaphores: &[Arc<Semaphore>]) -> Vec<Arc<Payload>> {
+    host::collect(semaphores.iter().map(|semaphore| semaphore.payloads().submit_signal()))
+}
+
+/// Pairs payloads with timeline values; binary semaphores need none.
+fn with_values(payloads: Vec<Arc<Payload>>, values: &[u64]) -> Vec<(Arc<Payload>, u64)> {
     let values = values.iter().copied().chain(std::iter::repeat(0));
-    semaphores.into_iter().zip(values).collect()
+    host::collect(payloads.into_iter().zip(values))
 }
 
 /// The batch of a `VkSubmitInfo2`.
@@ -135,26 +147,25 @@ unsafe fn batch2(info: &vk::SubmitInfo2<'_>) -> Result<Batch, Error> {
         let signals = valid::slice(info.p_signal_semaphore_infos, info.signal_semaphore_info_count)?;
         let command_buffers = valid::slice(info.p_command_buffer_infos, info.command_buffer_info_count)?;
         Ok(Batch {
-            waits: semaphores(waits)?,
+            waits: with_values(waited(&semaphores(waits)?), &timeline_values(waits)),
             commands: commands(command_buffers.iter().map(|info| info.command_buffer))?,
-            signals: semaphores(signals)?,
+            signals: with_values(signaled(&semaphores(signals)?), &timeline_values(signals)),
         })
     }
 }
 
-/// Semaphores with their values.
+/// The semaphores of infos.
 ///
 /// # Safety
 /// The handles are live.
-unsafe fn semaphores(infos: &[vk::SemaphoreSubmitInfo<'_>]) -> Result<Vec<(Arc<Semaphore>, u64)>, Error> {
-    infos
-        .iter()
-        .map(|info| {
-            // SAFETY: the caller's promise.
-            let semaphore = unsafe { handle::get(info.semaphore)? };
-            Ok((Arc::clone(semaphore), info.value))
-        })
-        .collect()
+unsafe fn semaphores(infos: &[vk::SemaphoreSubmitInfo<'_>]) -> Result<Vec<Arc<Semaphore>>, Error> {
+    // SAFETY: the caller's promise.
+    infos.iter().map(|info| unsafe { handle::get(info.semaphore).cloned() }).collect()
+}
+
+/// The timeline values of infos.
+fn timeline_values(infos: &[vk::SemaphoreSubmitInfo<'_>]) -> Vec<u64> {
+    host::collect(infos.iter().map(|info| info.value))
 }
 
 /// The present commands of command buffers.
@@ -185,7 +196,7 @@ pub(crate) unsafe fn queue_submit(
     submits: &[vk::SubmitInfo<'_>],
     fence: Option<&Arc<Fence>>,
 ) -> Result<(), Error> {
-    let mut batches = simdevice::host::with_capacity(submits.len());
+    let mut batches = host::with_capacity(submits.len());
     for submit in submits {
         // SAFETY: the caller's promise.
         batches.push(unsafe { batch(submit)? });
@@ -201,7 +212,7 @@ pub(crate) unsafe fn queue_submit2(
     submits: &[vk::SubmitInfo2<'_>],
     fence: Option<&Arc<Fence>>,
 ) -> Result<(), Error> {
-    let mut batches = simdevice::host::with_capacity(submits.len());
+    let mut batches = host::with_capacity(submits.len());
     for submit in submits {
         // SAFETY: the caller's promise.
         batches.push(unsafe { batch2(submit)? });
@@ -238,10 +249,10 @@ mod tests {
 
         /// Submits packets with a fence that a thread waits for. Returns the end of that wait.
         fn submit(&self, commands: Vec<Command>) -> WaitResult {
-            let fence = Arc::new(Fence::new(Arc::clone(&self.sync), false));
+            let fence = Payload::binary(&self.sync, false);
             let waiter = std::thread::spawn({
                 let (sync, fence) = (Arc::clone(&self.sync), Arc::clone(&fence));
-                move || sync.wait(None, || fence.is_signaled())
+                move || sync.wait(None, || fence.is_reached(0))
             });
             let mut recorder = super::super::buffer::Recorder::new();
             recorder.begin(&Enabled::strict(), Default::default()).unwrap();

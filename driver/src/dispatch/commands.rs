@@ -352,6 +352,9 @@ static ROWS: &[Command] = rows! {
         vkCmdSetLineStippleEnableEXT: vk::PFN_vkCmdSetLineStippleEnableEXT;
         vkCmdSetDepthClipNegativeOneToOneEXT: vk::PFN_vkCmdSetDepthClipNegativeOneToOneEXT;
     }
+    Device, DeviceExtension(&[c"VK_EXT_external_memory_host"]) => {
+        vkGetMemoryHostPointerPropertiesEXT: vk::PFN_vkGetMemoryHostPointerPropertiesEXT;
+    }
     Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
         vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT;
     }
@@ -470,11 +473,23 @@ static ROWS: &[Command] = rows! {
     PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_fence_capabilities"]) => {
         vkGetPhysicalDeviceExternalFencePropertiesKHR = vkGetPhysicalDeviceExternalFenceProperties;
     }
+    Device, DeviceExtension(&[c"VK_KHR_external_fence_fd"]) => {
+        vkImportFenceFdKHR: vk::PFN_vkImportFenceFdKHR;
+        vkGetFenceFdKHR: vk::PFN_vkGetFenceFdKHR;
+    }
     PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_memory_capabilities"]) => {
         vkGetPhysicalDeviceExternalBufferPropertiesKHR = vkGetPhysicalDeviceExternalBufferProperties;
     }
+    Device, DeviceExtension(&[c"VK_KHR_external_memory_fd"]) => {
+        vkGetMemoryFdKHR: vk::PFN_vkGetMemoryFdKHR;
+        vkGetMemoryFdPropertiesKHR: vk::PFN_vkGetMemoryFdPropertiesKHR;
+    }
     PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_semaphore_capabilities"]) => {
         vkGetPhysicalDeviceExternalSemaphorePropertiesKHR = vkGetPhysicalDeviceExternalSemaphoreProperties;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_external_semaphore_fd"]) => {
+        vkImportSemaphoreFdKHR: vk::PFN_vkImportSemaphoreFdKHR;
+        vkGetSemaphoreFdKHR: vk::PFN_vkGetSemaphoreFdKHR;
     }
     Device, DeviceExtension(&[c"VK_KHR_get_memory_requirements2"]) => {
         vkGetImageMemoryRequirements2KHR = vkGetImageMemoryRequirements2;
@@ -848,6 +863,8 @@ unsafe extern "system" fn vkAllocateMemory(
             info,
             valid::find_in_chain::<vk::ExportMemoryAllocateInfo<'_>>(info.p_next),
             valid::find_in_chain::<vk::MemoryPriorityAllocateInfoEXT<'_>>(info.p_next),
+            valid::find_in_chain::<vk::ImportMemoryFdInfoKHR<'_>>(info.p_next),
+            valid::find_in_chain::<vk::ImportMemoryHostPointerInfoEXT<'_>>(info.p_next),
         )?;
         valid::output(p_memory, handle::create(memory))
     })
@@ -1011,7 +1028,12 @@ unsafe extern "system" fn vkCreateFence(
 ) -> vk::Result {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(device, "vkCreateFence", || unsafe {
-        let fence = sync::create_fence(handle::get(device)?, valid::input(p_create_info)?)?;
+        let info = valid::input(p_create_info)?;
+        let fence = sync::create_fence(
+            handle::get(device)?,
+            info,
+            valid::find_in_chain::<vk::ExportFenceCreateInfo<'_>>(info.p_next),
+        )?;
         valid::output(p_fence, handle::create(fence))
     })
 }
@@ -2722,40 +2744,47 @@ unsafe extern "system" fn vkGetDeviceQueue2(
 
 unsafe extern "system" fn vkGetPhysicalDeviceExternalBufferProperties(
     physical_device: vk::PhysicalDevice,
-    _: *const vk::PhysicalDeviceExternalBufferInfo<'_>,
+    p_external_buffer_info: *const vk::PhysicalDeviceExternalBufferInfo<'_>,
     p_external_buffer_properties: *mut vk::ExternalBufferProperties<'_>,
 ) {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(physical_device, "vkGetPhysicalDeviceExternalBufferProperties", || unsafe {
-        physical_device::get_physical_device_external_buffer_properties(valid::output_structure(
-            p_external_buffer_properties,
-        )?)
+        let info = valid::input(p_external_buffer_info)?;
+        physical_device::external::get_physical_device_external_buffer_properties(
+            info.handle_type,
+            valid::output_structure(p_external_buffer_properties)?,
+        )
     })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceExternalFenceProperties(
     physical_device: vk::PhysicalDevice,
-    _: *const vk::PhysicalDeviceExternalFenceInfo<'_>,
+    p_external_fence_info: *const vk::PhysicalDeviceExternalFenceInfo<'_>,
     p_external_fence_properties: *mut vk::ExternalFenceProperties<'_>,
 ) {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(physical_device, "vkGetPhysicalDeviceExternalFenceProperties", || unsafe {
-        physical_device::get_physical_device_external_fence_properties(valid::output_structure(
-            p_external_fence_properties,
-        )?)
+        let info = valid::input(p_external_fence_info)?;
+        physical_device::external::get_physical_device_external_fence_properties(
+            info.handle_type,
+            valid::output_structure(p_external_fence_properties)?,
+        )
     })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceExternalSemaphoreProperties(
     physical_device: vk::PhysicalDevice,
-    _: *const vk::PhysicalDeviceExternalSemaphoreInfo<'_>,
+    p_external_semaphore_info: *const vk::PhysicalDeviceExternalSemaphoreInfo<'_>,
     p_external_semaphore_properties: *mut vk::ExternalSemaphoreProperties<'_>,
 ) {
     // SAFETY: the application follows Vulkan's valid usage.
     guard(physical_device, "vkGetPhysicalDeviceExternalSemaphoreProperties", || unsafe {
-        physical_device::get_physical_device_external_semaphore_properties(valid::output_structure(
-            p_external_semaphore_properties,
-        )?)
+        let info = valid::input(p_external_semaphore_info)?;
+        physical_device::external::get_physical_device_external_semaphore_properties(
+            info.handle_type,
+            valid::find_in_chain::<vk::SemaphoreTypeCreateInfo<'_>>(info.p_next),
+            valid::output_structure(p_external_semaphore_properties)?,
+        )
     })
 }
 
@@ -4031,6 +4060,22 @@ unsafe extern "system" fn vkCmdSetDepthClipNegativeOneToOneEXT(
     }
 }
 
+unsafe extern "system" fn vkGetMemoryHostPointerPropertiesEXT(
+    device: vk::Device,
+    handle_type: vk::ExternalMemoryHandleTypeFlags,
+    p_host_pointer: *const std::ffi::c_void,
+    p_memory_host_pointer_properties: *mut vk::MemoryHostPointerPropertiesEXT<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetMemoryHostPointerPropertiesEXT", || unsafe {
+        resource::memory::get_memory_host_pointer_properties(
+            handle_type,
+            p_host_pointer,
+            valid::output_structure(p_memory_host_pointer_properties)?,
+        )
+    })
+}
+
 unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
     instance: vk::Instance,
     _: *const vk::HeadlessSurfaceCreateInfoEXT<'_>,
@@ -4505,6 +4550,76 @@ unsafe extern "system" fn vkCmdSetRenderingInputAttachmentIndicesKHR(
     _: *const vk::RenderingInputAttachmentIndexInfoKHR<'_>,
 ) {
     guard(command_buffer, "vkCmdSetRenderingInputAttachmentIndicesKHR", || Ok(()))
+}
+
+unsafe extern "system" fn vkImportFenceFdKHR(
+    device: vk::Device,
+    p_import_fence_fd_info: *const vk::ImportFenceFdInfoKHR<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkImportFenceFdKHR", || unsafe {
+        let info = valid::input(p_import_fence_fd_info)?;
+        sync::import_fence_fd(handle::get(info.fence)?, info.flags, info.handle_type, info.fd)
+    })
+}
+
+unsafe extern "system" fn vkGetFenceFdKHR(
+    device: vk::Device,
+    p_get_fd_info: *const vk::FenceGetFdInfoKHR<'_>,
+    p_fd: *mut std::ffi::c_int,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetFenceFdKHR", || unsafe {
+        let info = valid::input(p_get_fd_info)?;
+        let fd = sync::get_fence_fd(handle::get(info.fence)?, info.handle_type)?;
+        valid::output(p_fd, fd)
+    })
+}
+
+unsafe extern "system" fn vkGetMemoryFdKHR(
+    device: vk::Device,
+    p_get_fd_info: *const vk::MemoryGetFdInfoKHR<'_>,
+    p_fd: *mut std::ffi::c_int,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetMemoryFdKHR", || unsafe {
+        let info = valid::input(p_get_fd_info)?;
+        let fd = resource::memory::get_memory_fd(handle::get(info.memory)?, info.handle_type)?;
+        valid::output(p_fd, fd)
+    })
+}
+
+unsafe extern "system" fn vkGetMemoryFdPropertiesKHR(
+    device: vk::Device,
+    handle_type: vk::ExternalMemoryHandleTypeFlags,
+    _: std::ffi::c_int,
+    _: *mut vk::MemoryFdPropertiesKHR<'_>,
+) -> vk::Result {
+    guard(device, "vkGetMemoryFdPropertiesKHR", || resource::memory::get_memory_fd_properties(handle_type))
+}
+
+unsafe extern "system" fn vkImportSemaphoreFdKHR(
+    device: vk::Device,
+    p_import_semaphore_fd_info: *const vk::ImportSemaphoreFdInfoKHR<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkImportSemaphoreFdKHR", || unsafe {
+        let info = valid::input(p_import_semaphore_fd_info)?;
+        sync::import_semaphore_fd(handle::get(info.semaphore)?, info.flags, info.handle_type, info.fd)
+    })
+}
+
+unsafe extern "system" fn vkGetSemaphoreFdKHR(
+    device: vk::Device,
+    p_get_fd_info: *const vk::SemaphoreGetFdInfoKHR<'_>,
+    p_fd: *mut std::ffi::c_int,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetSemaphoreFdKHR", || unsafe {
+        let info = valid::input(p_get_fd_info)?;
+        let fd = sync::get_semaphore_fd(handle::get(info.semaphore)?, info.handle_type)?;
+        valid::output(p_fd, fd)
+    })
 }
 
 unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilities2KHR(

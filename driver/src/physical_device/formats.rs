@@ -26,6 +26,8 @@ pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
     match format {
         vk::Format::A4R4G4B4_UNORM_PACK16 => Some(Format::A4R4G4B4UnormPack16),
         vk::Format::A4B4G4R4_UNORM_PACK16 => Some(Format::A4B4G4R4UnormPack16),
+        vk::Format::A1B5G5R5_UNORM_PACK16_KHR => Some(Format::A1B5G5R5UnormPack16),
+        vk::Format::A8_UNORM_KHR => Some(Format::A8Unorm),
         vk::Format::R10X6_UNORM_PACK16 => Some(Format::R10X6UnormPack16),
         vk::Format::R10X6G10X6_UNORM_2PACK16 => Some(Format::R10X6G10X6Unorm2Pack16),
         vk::Format::R10X6G10X6B10X6A10X6_UNORM_4PACK16 => Some(Format::R10X6G10X6B10X6A10X6Unorm4Pack16),

@@ -3,7 +3,7 @@
 //! Limits are at least Vulkan's required ones. [`Properties`] has a field for each property of the core version and of
 //! the listed extensions: each is defined only here.
 
-use super::memory;
+use super::{external, memory};
 use crate::convert;
 use crate::instance::API_VERSION;
 use crate::registry::properties::Properties;
@@ -154,6 +154,11 @@ fn uuid(name: &[u8; 13], version: [u8; 3]) -> [u8; vk::UUID_SIZE] {
     uuid
 }
 
+/// `driverUUID` and `deviceUUID`: devices share memory if they have the same.
+pub(crate) fn identity() -> [[u8; vk::UUID_SIZE]; 2] {
+    [uuid(b"GauRastDriver", driver_version()), uuid(b"GauRastDevice", [0; 3])]
+}
+
 /// The device's properties and limits.
 pub(crate) fn properties() -> &'static Properties {
     static PROPERTIES: LazyLock<Properties> = LazyLock::new(find_properties);
@@ -283,8 +288,8 @@ fn find_properties() -> Properties {
         residency_standard3_d_block_shape: false,
         residency_aligned_mip_size: false,
         residency_non_resident_strict: false,
-        device_uuid: uuid(b"GauRastDevice", [0; 3]),
-        driver_uuid: uuid(b"GauRastDriver", driver_version()),
+        device_uuid: identity()[1],
+        driver_uuid: identity()[0],
         device_luid: [0; vk::LUID_SIZE],
         device_node_mask: 0,
         device_luid_valid: false,
@@ -467,6 +472,7 @@ fn find_properties() -> Properties {
         precision_class: gaurast::vk::GaussianPrecisionClassGAURAST::FULL,
         allow_command_buffer_query_copies: false,
         max_push_descriptors: MAX_PUSH_DESCRIPTORS,
+        min_imported_host_pointer_alignment: external::HOST_ALIGNMENT,
     }
 }
 

@@ -28,6 +28,9 @@ const TYPES: [vk::MemoryPropertyFlags; 2] = [
 /// The `memoryTypeBits` of a resource that may use any type.
 pub(crate) const ALL_TYPE_BITS: u32 = (1 << TYPES.len()) - 1;
 
+/// The `memoryTypeBits` of the type that the host may map.
+pub(crate) const HOST_VISIBLE_TYPE_BITS: u32 = 1 << 1;
+
 /// The properties of a memory type; `None` if there is no such index.
 pub(crate) fn type_properties(index: u32) -> Option<vk::MemoryPropertyFlags> {
     TYPES.get(index as usize).copied()
@@ -134,6 +137,13 @@ mod tests {
                 assert!(!earlier.contains(*later));
             }
         }
+    }
+
+    #[test]
+    fn one_type_is_for_the_host() {
+        let is_visible = |flags: &vk::MemoryPropertyFlags| flags.contains(vk::MemoryPropertyFlags::HOST_VISIBLE);
+        let visible = (0..).zip(TYPES).filter(|(_, flags)| is_visible(flags));
+        assert_eq!(visible.map(|(index, _)| 1 << index).sum::<u32>(), HOST_VISIBLE_TYPE_BITS);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The physical device's properties, features, formats, memory, queues and counters, each defined once.
 
 pub(crate) mod counters;
+pub(crate) mod external;
 pub(crate) mod formats;
 pub(crate) mod limits;
 pub(crate) mod memory;
@@ -144,14 +145,18 @@ pub(crate) unsafe fn get_physical_device_image_format_properties2(
     let info = image_format_info;
     // SAFETY: the caller's promise.
     let external = unsafe { valid::find_in_chain::<vk::PhysicalDeviceExternalImageFormatInfo<'_>>(info.p_next) };
-    if external.is_some_and(|external| !external.handle_type.is_empty()) {
+    let handle_type = external.map_or_else(Default::default, |external| external.handle_type);
+    let shared = external::memory_properties(handle_type);
+    image_format_properties.for_each_chained(|mut structure| {
+        if let Some(out) = structure.cast::<vk::ExternalImageFormatProperties<'_>>() {
+            out.external_memory_properties = shared;
+        }
+    });
+    if !handle_type.is_empty() && shared.external_memory_features.is_empty() {
         image_format_properties.image_format_properties = vk::ImageFormatProperties::default();
         return Ok(vk::Result::ERROR_FORMAT_NOT_SUPPORTED);
     }
     image_format_properties.for_each_chained(|mut structure| {
-        if let Some(out) = structure.cast::<vk::ExternalImageFormatProperties<'_>>() {
-            out.external_memory_properties = vk::ExternalMemoryProperties::default();
-        }
         if let Some(out) = structure.cast::<vk::SamplerYcbcrConversionImageFormatProperties<'_>>() {
             out.combined_image_sampler_descriptor_count = 1;
         }
@@ -240,36 +245,6 @@ pub(crate) fn enumerate_device_extension_properties(
 #[doc(alias = "vkEnumerateDeviceLayerProperties")]
 pub(crate) fn enumerate_device_layer_properties() -> Result<[vk::LayerProperties; 0], Error> {
     Ok([])
-}
-
-#[doc(alias = "vkGetPhysicalDeviceExternalBufferProperties")]
-pub(crate) fn get_physical_device_external_buffer_properties(
-    external_buffer_properties: &mut vk::ExternalBufferProperties<'_>,
-) -> Result<(), Error> {
-    external_buffer_properties.external_memory_properties = vk::ExternalMemoryProperties::default();
-    Ok(())
-}
-
-#[doc(alias = "vkGetPhysicalDeviceExternalFenceProperties")]
-pub(crate) fn get_physical_device_external_fence_properties(
-    external_fence_properties: &mut vk::ExternalFenceProperties<'_>,
-) -> Result<(), Error> {
-    let properties = external_fence_properties;
-    properties.export_from_imported_handle_types = vk::ExternalFenceHandleTypeFlags::empty();
-    properties.compatible_handle_types = vk::ExternalFenceHandleTypeFlags::empty();
-    properties.external_fence_features = vk::ExternalFenceFeatureFlags::empty();
-    Ok(())
-}
-
-#[doc(alias = "vkGetPhysicalDeviceExternalSemaphoreProperties")]
-pub(crate) fn get_physical_device_external_semaphore_properties(
-    external_semaphore_properties: &mut vk::ExternalSemaphoreProperties<'_>,
-) -> Result<(), Error> {
-    let properties = external_semaphore_properties;
-    properties.export_from_imported_handle_types = vk::ExternalSemaphoreHandleTypeFlags::empty();
-    properties.compatible_handle_types = vk::ExternalSemaphoreHandleTypeFlags::empty();
-    properties.external_semaphore_features = vk::ExternalSemaphoreFeatureFlags::empty();
-    Ok(())
 }
 
 #[doc(alias = "vkGetPhysicalDeviceToolProperties")]

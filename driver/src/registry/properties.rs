@@ -288,6 +288,9 @@ properties! {
     structure vk::PhysicalDeviceExtendedDynamicState3PropertiesEXT {
         dynamicPrimitiveTopologyUnrestricted => dynamic_primitive_topology_unrestricted: bool;
     }
+    structure vk::PhysicalDeviceExternalMemoryHostPropertiesEXT {
+        minImportedHostPointerAlignment => min_imported_host_pointer_alignment: vk::DeviceSize;
+    }
     structure vk::PhysicalDeviceGraphicsPipelineLibraryPropertiesEXT {
         graphicsPipelineLibraryFastLinking => graphics_pipeline_library_fast_linking: bool;
         graphicsPipelineLibraryIndependentInterpolationDecoration =>

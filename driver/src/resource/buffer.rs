@@ -6,9 +6,9 @@ use crate::abi::handle::{self, objects};
 use crate::abi::valid::OutputChain;
 use crate::device::Device;
 use crate::device_addresses::Addresses;
-use crate::physical_device::formats;
 use crate::physical_device::limits::{MAX_TEXEL_BUFFER_ELEMENTS, MIN_BUFFER_OFFSET_ALIGNMENT};
 use crate::physical_device::memory::ALL_TYPE_BITS;
+use crate::physical_device::{external, formats};
 use ash::vk;
 use simdevice::BufferRange;
 use simdevice::{Allocation, Format};
@@ -168,12 +168,12 @@ pub(crate) fn fits(vuid: &'static str, memory: &Allocation, offset: u64, size: u
 /// The buffer of a create info.
 fn new_buffer(
     info: &vk::BufferCreateInfo<'_>,
-    external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
+    shared: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
     usage: vk::BufferUsageFlags,
     addresses: &Arc<Addresses>,
 ) -> Result<Buffer, Error> {
-    if external.is_some_and(|external| !external.handle_types.is_empty()) {
-        return Err(Error::FeatureNotPresent("external memory".into()));
+    if let Some(shared) = shared {
+        external::check_memory_types(shared.handle_types, "VUID-VkBufferCreateInfo-pNext-00920")?;
     }
     let sparse_or_protected = vk::BufferCreateFlags::SPARSE_BINDING
         | vk::BufferCreateFlags::SPARSE_RESIDENCY
@@ -208,12 +208,12 @@ pub(crate) fn fill_requirements(
 pub(crate) fn create_buffer(
     device: &Device,
     create_info: &vk::BufferCreateInfo<'_>,
-    external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
+    shared: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
     usage2: Option<&vk::BufferUsageFlags2CreateInfoKHR<'_>>,
 ) -> Result<Arc<Buffer>, Error> {
     // The first 32 flags of the longer word are those of the shorter.
     let usage = usage2.map_or(create_info.usage, |it| vk::BufferUsageFlags::from_raw(it.usage.as_raw() as u32));
-    new_buffer(create_info, external, usage, device.addresses()).map(Arc::new)
+    new_buffer(create_info, shared, usage, device.addresses()).map(Arc::new)
 }
 
 #[doc(alias = "vkGetBufferDeviceAddress")]

@@ -7,6 +7,7 @@ use crate::abi::error::Error;
 use crate::abi::handle::objects;
 use crate::abi::valid::{OutputChain, Structures};
 use crate::convert;
+use crate::physical_device::external;
 use crate::physical_device::formats::{self, ImageQuery, YcbcrFormat};
 use ash::vk;
 use simdevice::format::Aspect;
@@ -387,11 +388,11 @@ fn unsupported_format(format: vk::Format) -> Error {
 /// [`Error::FormatNotSupported`] or [`Error::InvalidUsage`] if such an image is not supported.
 pub(crate) fn new_image(
     info: &vk::ImageCreateInfo<'_>,
-    external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
+    shared: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
     stencil: Option<&vk::ImageStencilUsageCreateInfo<'_>>,
 ) -> Result<Image, Error> {
-    if external.is_some_and(|external| !external.handle_types.is_empty()) {
-        return Err(Error::FeatureNotPresent("external memory".into()));
+    if let Some(shared) = shared {
+        external::check_memory_types(shared.handle_types, "VUID-VkImageCreateInfo-pNext-00990")?;
     }
     let supported = formats::image_properties(ImageQuery {
         format: info.format,
@@ -447,10 +448,10 @@ pub(crate) fn new_image(
 #[doc(alias = "vkCreateImage")]
 pub(crate) fn create_image(
     create_info: &vk::ImageCreateInfo<'_>,
-    external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
+    shared: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
     stencil: Option<&vk::ImageStencilUsageCreateInfo<'_>>,
 ) -> Result<Arc<Image>, Error> {
-    new_image(create_info, external, stencil).map(Arc::new)
+    new_image(create_info, shared, stencil).map(Arc::new)
 }
 
 #[doc(alias = "vkGetImageMemoryRequirements")]

@@ -1,4 +1,8 @@
-//! Hints to the host and to the processor: huge pages and prefetches. They change only the time that accesses take.
+//! Hints to the host and to the processor, huge pages and prefetches, which change only the time that accesses take; and
+//! what the host says of pages.
+
+/// The alignment of every allocation in bytes, and the granularity at which the host backs it with pages.
+pub const PAGE_SIZE: u64 = 4096;
 
 /// The least size of a range for which huge pages are requested. With them a range is backed in fewer steps, and
 /// scattered reads of it miss the TLB less often. In smaller ranges too many pages would be backed that are never used.
@@ -26,6 +30,23 @@ pub(crate) unsafe fn prefer_huge(start: *mut u8, len: usize) {
     }
     #[cfg(not(target_os = "linux"))]
     let _ = (start, len);
+}
+
+/// Reports whether something is mapped in every page of a range, as far as the host tells.
+pub(crate) fn is_mapped(start: *mut u8, len: usize) -> bool {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::mm::{MsyncFlags, msync};
+        let page = rustix::param::page_size();
+        let before = start.addr() % page;
+        // SAFETY: with this flag the host looks whether the pages are mapped, and changes nothing.
+        unsafe { msync(start.wrapping_sub(before).cast(), len + before, MsyncFlags::ASYNC) }.is_ok()
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = (start, len);
+        true
+    }
 }
 
 /// The size of a cache line in bytes.

@@ -13,10 +13,11 @@ pub mod level;
 mod lookup;
 mod memory;
 mod runs;
+pub mod shared;
 
 #[doc(hidden)]
 pub use fearless_simd;
-pub use hints::prefetch;
+pub use hints::{PAGE_SIZE, prefetch};
 pub use lookup::{gather, gather_2, gather_4, gather_each, look_up, look_up_16};
-pub use memory::{Allocation, AllocationError, BufferRange, DerivedData, OutOfBounds, PAGE_SIZE};
+pub use memory::{Allocation, AllocationError, BufferRange, DerivedData, OutOfBounds};
 pub use runs::{load_4, load_16, store_16};

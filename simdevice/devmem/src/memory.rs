@@ -1,15 +1,16 @@
 //! Allocations of device memory, and every way of reading and writing them.
 
+use crate::hints::PAGE_SIZE;
+use crate::shared::{self, ImportError, Label};
 use crate::{hints, host};
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};
 use std::any::Any;
 use std::fmt;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// The alignment of every allocation in bytes, and the granularity at which the host backs it with pages.
-pub const PAGE_SIZE: u64 = 4096;
 
 /// The error that the host could not back an allocation.
 #[derive(Debug, thiserror::Error)]
@@ -39,12 +40,33 @@ pub struct OutOfBounds {
 /// The host backs its pages when they are first touched, so that only used memory costs memory.
 #[derive(Debug)]
 pub struct Allocation {
-    map: MmapRaw,
+    start: Start,
+    backing: Backing,
     len: u64,
     /// The number of packets that wrote, by which data derived from the contents tell whether they are up to date.
     generation: AtomicU64,
     host_visible: bool,
     derived: Derived,
+}
+
+/// The address of byte 0.
+#[derive(Clone, Copy, Debug)]
+struct Start(*mut u8);
+
+// SAFETY: it is an address alone. What is there is accessed through an `Allocation`, by raw pointers and atomics.
+unsafe impl Send for Start {}
+// SAFETY: as for `Send`.
+unsafe impl Sync for Start {}
+
+/// The owner of an allocation's pages.
+#[derive(Debug)]
+enum Backing {
+    /// A mapping of this process alone.
+    Own { _map: MmapRaw },
+    /// A mapping of a file that other processes may map too.
+    Shared { _map: MmapRaw, file: OwnedFd },
+    /// The application.
+    Host,
 }
 
 /// Data derived from an allocation's contents.
@@ -91,9 +113,81 @@ impl Allocation {
         }
         let map = MmapOptions::new().len(bytes).no_reserve_swap().map_anon().map_err(refuse)?;
         let map = MmapRaw::from(map);
+        let start = Start(map.as_mut_ptr());
         // SAFETY: the mapping is new and belongs to this function.
-        unsafe { hints::prefer_huge(map.as_mut_ptr(), bytes) };
-        Ok(Arc::new(Self { map, len, generation: AtomicU64::new(0), host_visible, derived: Derived::default() }))
+        unsafe { hints::prefer_huge(start.0, bytes) };
+        Ok(Self::of(start, Backing::Own { _map: map }, len, host_visible))
+    }
+
+    /// Allocates `len` bytes of zeroed memory that other processes may map by its [file](Self::file), which has a label.
+    ///
+    /// # Errors
+    /// As [`Allocation::new_zeroed`], and if the process has no file descriptor left.
+    pub fn new_shared(len: u64, label: &Label) -> Result<Arc<Self>, AllocationError> {
+        let refuse = |source| AllocationError { size: len, source };
+        let size = shared::mapped_size(len).filter(|_| len > 0);
+        let size = size.ok_or_else(|| refuse(std::io::ErrorKind::InvalidInput.into()))?;
+        if host::injection::fails() {
+            return Err(refuse(std::io::ErrorKind::OutOfMemory.into()));
+        }
+        let file = shared::create(size, label).map_err(refuse)?;
+        Self::map_file(file, len).map_err(refuse)
+    }
+
+    /// Maps the `len` bytes of memory that another allocation, perhaps of another process, has in its
+    /// [file](Self::file).
+    ///
+    /// # Errors
+    /// [`ImportError`] if it is no such file, or one for another length.
+    pub fn import(file: BorrowedFd<'_>, len: u64) -> Result<Arc<Self>, ImportError> {
+        shared::check(file, len)?;
+        Ok(Self::map_file(file.try_clone_to_owned()?, len)?)
+    }
+
+    /// Maps a file whose size is sealed and at least `len` bytes. `len` fits the address space.
+    fn map_file(file: OwnedFd, len: u64) -> std::io::Result<Arc<Self>> {
+        if len == 0 {
+            return Err(std::io::ErrorKind::InvalidInput.into());
+        }
+        let map = MmapOptions::new().len(len as usize).no_reserve_swap().map_raw(&file)?;
+        let start = Start(map.as_mut_ptr());
+        // SAFETY: the mapping is new and belongs to this function.
+        unsafe { hints::prefer_huge(start.0, len as usize) };
+        Ok(Self::of(start, Backing::Shared { _map: map, file }, len, true))
+    }
+
+    /// An allocation of the `len` bytes of the application's own memory from `start` on, which are neither copied nor
+    /// freed.
+    ///
+    /// # Errors
+    /// [`AllocationError`] if nothing is mapped in a part of the range, if `start` is not a multiple of [`PAGE_SIZE`], or if
+    /// `len` is zero or does not fit the address space. Whether the range may be written to is not checked.
+    ///
+    /// # Safety
+    /// The range may be read and written as long as the allocation exists, by any thread, and no Rust reference other than
+    /// to atomics covers it.
+    pub unsafe fn of_host(start: NonNull<u8>, len: u64) -> Result<Arc<Self>, AllocationError> {
+        let refuse = |source| AllocationError { size: len, source };
+        let bytes = usize::try_from(len).ok().filter(|&bytes| bytes > 0 && bytes <= isize::MAX as usize);
+        let is_aligned = (start.addr().get() as u64).is_multiple_of(PAGE_SIZE);
+        let bytes = bytes.filter(|&bytes| is_aligned && start.addr().get().checked_add(bytes).is_some());
+        let bytes = bytes.ok_or_else(|| refuse(std::io::ErrorKind::InvalidInput.into()))?;
+        if !hints::is_mapped(start.as_ptr(), bytes) {
+            return Err(refuse(std::io::ErrorKind::NotFound.into()));
+        }
+        Ok(Self::of(Start(start.as_ptr()), Backing::Host, len, true))
+    }
+
+    fn of(start: Start, backing: Backing, len: u64, host_visible: bool) -> Arc<Self> {
+        Arc::new(Self { start, backing, len, generation: AtomicU64::new(0), host_visible, derived: Derived::default() })
+    }
+
+    /// The file by which other processes may map the memory, if it was allocated so.
+    pub fn file(&self) -> Option<BorrowedFd<'_>> {
+        match &self.backing {
+            Backing::Shared { file, .. } => Some(file.as_fd()),
+            Backing::Own { .. } | Backing::Host => None,
+        }
     }
 
     /// The length in bytes.
@@ -102,7 +196,8 @@ impl Allocation {
         self.len
     }
 
-    /// Reports whether the host may map this memory, and so change it at any time without the device noticing.
+    /// Reports whether the host may map this memory, or another process has it, and so change it at any time without the
+    /// device noticing.
     pub fn is_host_visible(&self) -> bool {
         self.host_visible
     }
@@ -132,7 +227,7 @@ impl Allocation {
 
     /// The address of byte 0, for the application that maps this memory; valid as long as the allocation exists.
     pub fn host_pointer(&self) -> *mut u8 {
-        self.map.as_mut_ptr()
+        self.start.0
     }
 
     /// Copies `out.len()` elements from byte `offset` on.
@@ -329,6 +424,29 @@ mod tests {
         assert!(Allocation::new_zeroed(0).is_err());
         assert!(Allocation::new_zeroed(u64::MAX).is_err());
         assert!(Allocation::new_zeroed(1 << 62).is_err());
+    }
+
+    #[test]
+    fn memory_of_the_application_stays_its_own() {
+        let mut map = MmapOptions::new().len(8192).map_anon().unwrap();
+        let start = NonNull::new(map.as_mut_ptr()).unwrap();
+        // SAFETY: the range is the mapping, of which there is no reference meanwhile.
+        unsafe {
+            let memory = Allocation::of_host(start, 8192).unwrap();
+            memory.write(8190, &[3u8, 4]).unwrap();
+            assert!(memory.write(8191, &[3u8, 4]).is_err());
+            assert!(memory.is_host_visible());
+            assert!(memory.file().is_none());
+            drop(memory);
+            assert!(Allocation::of_host(start, 0).is_err());
+            assert!(Allocation::of_host(start.add(64), 64).is_err());
+            assert!(Allocation::of_host(start, u64::MAX).is_err());
+        }
+        assert_eq!(map[8190..], [3, 4]);
+        drop(map);
+        let page = NonNull::<u8>::dangling().with_addr(std::num::NonZero::new(4096).unwrap());
+        // SAFETY: the range is looked at alone.
+        assert!(unsafe { Allocation::of_host(page, 4096) }.is_err(), "nothing is mapped at the start");
     }
 
     #[test]

@@ -53,6 +53,8 @@ formats! {
     R5G5B5A1UnormPack16: Unorm, A 1 B 5 G 5 R 5;
     B5G5R5A1UnormPack16: Unorm, A 1 R 5 G 5 B 5;
     A1R5G5B5UnormPack16: Unorm, B 5 G 5 R 5 A 1;
+    A1B5G5R5UnormPack16: Unorm, R 5 G 5 B 5 A 1;
+    A8Unorm: Unorm, A 8;
     R8Unorm: Unorm, R 8;
     R8Snorm: Snorm, R 8;
     R8Uscaled: Uscaled, R 8;

@@ -85,6 +85,7 @@ fn packed_formats_have_their_components_in_place() {
     assert_eq!(bits16(Format::R5G6B5UnormPack16), 0xF800);
     assert_eq!(bits16(Format::B5G6R5UnormPack16), 0x001F);
     assert_eq!(bits16(Format::A1R5G5B5UnormPack16), 0x7C00);
+    assert_eq!(bits16(Format::A1B5G5R5UnormPack16), 0x001F);
     assert_eq!(bits16(Format::R5G5B5A1UnormPack16), 0xF800);
     assert_eq!(bits16(Format::B5G5R5A1UnormPack16), 0x003E);
     assert_eq!(bits16(Format::R4G4B4A4UnormPack16), 0xF000);

@@ -17,6 +17,7 @@
 //! | [`shapes`] | vertices of shapes that scenes draw |
 //! | [`drawn`] | scenes that this driver and lavapipe draw |
 //! | [`stage_program`] | programs of geometry and tessellation shaders, which both drivers run |
+//! | [`sharing`] | memory, semaphores and fences that devices and processes share |
 //! | [`packets`] | resources for a device that is driven by packets, without Vulkan |
 //! | [`newer`] | structures that are newer than ash, SPIR-V that is newer than the compiler |
 //! | [`presenter`] | a device that presents to a surface |
@@ -54,6 +55,7 @@ pub mod scene;
 pub mod settings;
 pub mod shader;
 pub mod shapes;
+pub mod sharing;
 pub mod stage_program;
 pub mod target;
 pub mod texels;

@@ -97,7 +97,11 @@ impl Opening<'_> {
 }
 
 /// Extensions of this driver that tests use.
-pub const EXTENSIONS: [&CStr; 7] = [
+pub const EXTENSIONS: [&CStr; 11] = [
+    ash::ext::external_memory_host::NAME,
+    ash::khr::external_fence_fd::NAME,
+    ash::khr::external_memory_fd::NAME,
+    ash::khr::external_semaphore_fd::NAME,
     ash::khr::map_memory2::NAME,
     ash::khr::performance_query::NAME,
     ash::khr::push_descriptor::NAME,

@@ -436,7 +436,7 @@ impl From<&Image> for vk::Image {
 /// # Panics
 /// If the device has none.
 pub fn device_format(format: vk::Format) -> Format {
-    let name = format!("{format:?}").replace('_', "");
+    let name = format!("{format:?}").trim_end_matches("_KHR").replace('_', "");
     let found = Format::ALL.iter().copied();
     let mut found = found.filter(|known| format!("{known:?}").eq_ignore_ascii_case(&name));
     found.next().expect("a format that the device has")

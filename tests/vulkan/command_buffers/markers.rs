@@ -4,6 +4,7 @@ use ash::vk;
 use ash::vk::Handle;
 use gaurast_testkit::{Buffer, Driver, Gpu, Opening};
 
+#[expect(deprecated, reason = "applications still use the older extension")]
 #[gaurast_runner::test]
 fn markers_and_names_do_nothing() {
     let opening = Opening { extensions: &[ash::ext::debug_marker::NAME], ..Opening::of(Driver::Embedded) };

@@ -169,6 +169,25 @@ fn components_of_four_bits_have_their_places() {
     }
 }
 
+/// The formats of the fifth maintenance: five bits from red on, and alpha alone, whose other components are 0.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn components_of_the_fifth_maintenance_have_their_places() {
+    let mut features = vk::PhysicalDeviceMaintenance5FeaturesKHR::default().maintenance5(true);
+    let gpu = &Gpu::extended(&[ash::khr::maintenance5::NAME], &mut features).expect("a device");
+    let nearest = vk::SamplerCreateInfo::default();
+    let code = "found = textureLod(image, vec2(0.5), 0.0);";
+    let usage = vk::ImageUsageFlags::SAMPLED;
+    let fives = ImageOptions::new(vk::Format::A1B5G5R5_UNORM_PACK16_KHR, [1, 1], usage);
+    let image = Image::textured(gpu, &fives, &[vec![0b1_00011_00010_00001u16]]);
+    let expected = [1.0 / 31.0, 2.0 / 31.0, 3.0 / 31.0, 1.0];
+    for (found, expected) in sampled(gpu, &image, &nearest, code).iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-6, "{found}");
+    }
+    let alpha = ImageOptions::new(vk::Format::A8_UNORM_KHR, [1, 1], usage);
+    let image = Image::textured(gpu, &alpha, &[vec![51u8]]);
+    assert_eq!(sampled(gpu, &image, &nearest, code), [0.0, 0.0, 0.0, 0.2]);
+}
+
 /// Across a cube's edge lies the next face, or, with seams, what the address mode says of the face alone.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn cubes_may_have_seams() {

@@ -10,7 +10,7 @@ use self::draw::DrawError;
 use self::state::{SharedSet, State, slot};
 use super::{Command, DrawByteCount, DrawIndirect, DrawParameters, HarmonicsBuffer, query};
 use crate::abi::error::Error;
-use crate::device_sync::{DeviceSync, WaitResult};
+use crate::device_sync::{DeviceSync, Outside, WaitResult};
 use crate::instance::Instance;
 use crate::pipeline::PipelineKind;
 use ash::vk;
@@ -30,12 +30,12 @@ pub(super) struct Execution<'a> {
 }
 
 impl Execution<'_> {
-    /// Waits until `ready`.
+    /// Waits until `ready`. What others than the device change is `outside`.
     ///
     /// # Errors
     /// [`Error::DeviceLost`] if the device was lost meanwhile.
-    pub(super) fn wait(&self, ready: impl Fn() -> bool) -> Result<(), Error> {
-        match self.sync.wait(None, ready) {
+    pub(super) fn wait(&self, outside: Option<Outside<'_>>, ready: impl Fn() -> bool) -> Result<(), Error> {
+        match self.sync.wait_for(None, outside, ready) {
             WaitResult::Ready => Ok(()),
             WaitResult::TimedOut | WaitResult::Lost => {
                 Err(Error::DeviceLost("it was lost while a queue waited".into()))
@@ -187,7 +187,7 @@ fn execute(command: &Command, state: &mut State, execution: &mut Execution<'_>) 
         Command::SetEvent(event, value) => event.set(*value),
         Command::WaitEvents(events) => {
             for event in events {
-                execution.wait(|| event.is_set())?;
+                execution.wait(None, || event.is_set())?;
             }
         }
         Command::CopyQueryResults(copy) => {

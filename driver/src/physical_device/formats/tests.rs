@@ -3,9 +3,13 @@ use std::collections::HashSet;
 
 #[test]
 fn every_format_of_the_device_has_a_vulkan_name() {
-    // The first block of core formats, the two formats of four bits that were added later, and those beside formats with
-    // chroma.
-    let later = [vk::Format::A4R4G4B4_UNORM_PACK16, vk::Format::A4B4G4R4_UNORM_PACK16];
+    // The first block of core formats, the formats of few bits that were added later, and those beside formats with chroma.
+    let later = [
+        vk::Format::A4R4G4B4_UNORM_PACK16,
+        vk::Format::A4B4G4R4_UNORM_PACK16,
+        vk::Format::A1B5G5R5_UNORM_PACK16_KHR,
+        vk::Format::A8_UNORM_KHR,
+    ];
     let ycbcr = vk::Format::G8B8G8R8_422_UNORM.as_raw()..=vk::Format::G16_B16_R16_3PLANE_444_UNORM.as_raw();
     let found: HashSet<_> = (0..=vk::Format::ASTC_12X12_SRGB_BLOCK.as_raw())
         .map(vk::Format::from_raw)
