@@ -12,13 +12,14 @@ use crate::convert;
 use crate::listeners::{DebugMessenger, DebugReportCallback, Listeners, Message, ReportOrigin};
 use crate::options::Options;
 use crate::registry::extensions::{DEVICE, Extension, INSTANCE};
+use crate::registry::newer;
 use crate::window;
 use ash::vk;
 use std::ffi::CStr;
 use std::sync::{Arc, LazyLock, Weak};
 
 /// The version of the instance and of its device.
-pub(crate) const API_VERSION: u32 = vk::HEADER_VERSION_COMPLETE;
+pub(crate) const API_VERSION: u32 = newer::HEADER_VERSION_COMPLETE;
 
 /// The names of all device extensions.
 pub(crate) fn device_extension_names() -> &'static [&'static CStr] {

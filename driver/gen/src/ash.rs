@@ -2,12 +2,15 @@
 
 use crate::error::Error;
 use crate::file::File;
-use crate::registry::Registry;
+use crate::registry::{Registry, Version};
 use crate::rust;
 use proc_macro2::{Group, TokenStream, TokenTree};
 use quote::ToTokens;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+/// The newest core version that ash declares.
+pub(crate) const VERSION: Version = (1, 3);
 
 /// The driver's declarations of structures that are newer than ash.
 const NEWER: &str = "driver/src/registry/newer.rs";

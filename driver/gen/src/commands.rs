@@ -112,6 +112,7 @@ pub(crate) fn write(
             use crate::command::buffer::record;
             use crate::command::dynamic_state::{{set, set_faces}};
             use crate::pipeline::dynamic_state::DynamicState;
+            use crate::registry::newer::API_VERSION_1_4;
             use crate::{{{modules}}};
             use ash::vk;
 
@@ -133,7 +134,8 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
         let (major, minor) = requirement.by;
         for name in &requirement.commands {
             if seen.insert(name) {
-                rows.push(Row { name, gate: format!("Core(vk::API_VERSION_{major}_{minor})") });
+                let path = if requirement.by > ash::VERSION { "" } else { "vk::" };
+                rows.push(Row { name, gate: format!("Core({path}API_VERSION_{major}_{minor})") });
             }
         }
     }

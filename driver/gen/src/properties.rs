@@ -1,9 +1,9 @@
 //! Writes `registry/properties.rs`.
 
-use crate::ash::Declarations;
+use crate::ash::{self, Declarations};
 use crate::chains::Chained;
 use crate::error::Error;
-use crate::registry::Registry;
+use crate::registry::{self, Registry};
 use crate::rust;
 use crate::support::Support;
 use crate::tables::{Row, Table, path};
@@ -35,6 +35,11 @@ pub(crate) fn structures<'a>(
     Chained::all(registry, declarations, support, "VkPhysicalDeviceProperties2")
 }
 
+/// The member with the number of elements, of a list that the application lends. The driver itself writes such lists.
+fn list<'a>(member: &'a registry::Member, declared: &ash::Member) -> Option<&'a str> {
+    declared.ty.starts_with('*').then_some(member.len.as_deref()).flatten()
+}
+
 /// The name of a structure's member among all properties.
 pub(crate) fn field<'a>(structure: &str, member: &'a str) -> &'a str {
     RENAMED.iter().find(|(of, from, _)| *of == structure && *from == member).map_or(member, |(_, _, to)| to)
@@ -52,9 +57,11 @@ pub(crate) fn write(registry: &Registry, declarations: &Declarations, support: &
     let mut table = Table::default();
     for (heading, chained) in &holders {
         let mut rows = Vec::new();
+        let lists: Vec<&str> = chained.members().filter_map(|(member, declared)| list(member, declared)).collect();
         for (member, declared) in chained.members() {
             let field = field(chained.name, &declared.name);
-            if PARTS.contains(&field) {
+            let is_list = list(member, declared).is_some() || lists.contains(&member.name.as_str());
+            if PARTS.contains(&field) || is_list {
                 continue;
             }
             let ty = declared.ty.as_str();

@@ -15,6 +15,7 @@ pub(crate) mod gaussian_decoding;
 pub(crate) mod gaussian_harmonics;
 pub(crate) mod gaussian_set;
 pub(crate) mod gaussian_state;
+pub(crate) mod host_image_copy;
 pub(crate) mod query;
 pub(crate) mod render_pass;
 mod render_scope;

@@ -42,7 +42,7 @@ pub(crate) fn cmd_copy_image2(
     regions: &[vk::ImageCopy2<'_>],
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    for copy in copy_image(src_image, dst_image, regions)? {
+    for copy in copy_image([src_image, dst_image], [&COPY_SOURCE, &COPY_TARGET], regions)? {
         recorder.packet(Packet::CopyImage(copy));
     }
     Ok(())
@@ -203,15 +203,15 @@ pub(crate) fn cmd_clear_attachments(
 }
 
 /// The ids of the rules on a use of an image.
-struct ImageRules {
+pub(super) struct ImageRules {
     /// The image must be bound to memory.
-    memory: &'static str,
+    pub(super) memory: &'static str,
     /// The image must have the named aspects.
-    aspect: &'static str,
+    pub(super) aspect: &'static str,
     /// The image must have the named mip levels.
-    level: &'static str,
+    pub(super) level: &'static str,
     /// The image must have the named array layers.
-    layers: &'static str,
+    pub(super) layers: &'static str,
 }
 
 /// The rules on the source of `vkCmdCopyBuffer`.
@@ -397,24 +397,27 @@ impl<P: Copy + PartialEq, R> ByPlanes<P, R> {
     }
 }
 
-/// `vkCmdCopyImage`: a copy for each pair of planes.
+/// A copy from one image to the other for each pair of planes.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] if an image is not bound, has no such subresource, or differs from the other in its samples.
-fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Result<Vec<CopyImage>, Error> {
-    let (from, to) = (source.desc.samples, target.desc.samples);
+pub(super) fn copy_image(
+    [source_image, target_image]: [&Image; 2],
+    [source_rules, target_rules]: [&ImageRules; 2],
+    regions: &[vk::ImageCopy2],
+) -> Result<Vec<CopyImage>, Error> {
+    let (from, to) = (source_image.desc.samples, target_image.desc.samples);
     if from != to {
         return Err(Error::usage(
             "VUID-vkCmdCopyImage-srcImage-00136",
             format!("one image has {from} samples, the other {to}"),
         ));
     }
-    let (source_image, target_image) = (source, target);
     let mut copies = ByPlanes::default();
     for region in regions {
         let (planes, pairs) = layer_pairs(
-            &CopySide { image: source_image, layers: region.src_subresource, rules: &COPY_SOURCE },
-            &CopySide { image: target_image, layers: region.dst_subresource, rules: &COPY_TARGET },
+            &CopySide { image: source_image, layers: region.src_subresource, rules: source_rules },
+            &CopySide { image: target_image, layers: region.dst_subresource, rules: target_rules },
         )?;
         for (source, target) in pairs {
             let converted = ImageCopyRegion {
@@ -429,8 +432,8 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
     }
     let copy = |([source, target], regions): ([usize; 2], _)| {
         Ok(CopyImage {
-            source: Arc::clone(source_image.bound_plane(source, COPY_SOURCE.memory)?),
-            target: Arc::clone(target_image.bound_plane(target, COPY_TARGET.memory)?),
+            source: Arc::clone(source_image.bound_plane(source, source_rules.memory)?),
+            target: Arc::clone(target_image.bound_plane(target, target_rules.memory)?),
             regions,
         })
     };
@@ -624,7 +627,7 @@ fn subresource_range(
 }
 
 /// The plane and the subresources of a copy that must name exactly one aspect; `single` is the id of that rule.
-fn layers(
+pub(super) fn layers(
     image: &Image,
     layers: &vk::ImageSubresourceLayers,
     rules: &ImageRules,
@@ -695,14 +698,14 @@ fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {
 }
 
 /// Converts an offset from texels to the blocks in which an image is stored.
-fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
+pub(super) fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
     // Valid usage requires multiples of a block's extent.
     let [across, down] = image.desc.format.block_extent().map(u32::cast_signed);
     [offset.x / across, offset.y / down, offset.z]
 }
 
 /// Converts an extent from texels to the blocks in which an image is stored.
-fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
+pub(super) fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
     let [across, down] = image.desc.format.block_extent();
     [extent.width.div_ceil(across), extent.height.div_ceil(down), extent.depth]
 }

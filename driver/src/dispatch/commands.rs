@@ -18,6 +18,7 @@ use crate::abi::valid::{self, OutputChain, Structures};
 use crate::command::buffer::record;
 use crate::command::dynamic_state::{set, set_faces};
 use crate::pipeline::dynamic_state::DynamicState;
+use crate::registry::newer::API_VERSION_1_4;
 use crate::{
     calibrated_timestamps, command, descriptor, device, instance, physical_device, pipeline, query_pool, queue,
     render_pass, resource, shader_module, surface, swapchain, sync,
@@ -262,6 +263,27 @@ static ROWS: &[Command] = rows! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable;
     }
+    Device, Core(API_VERSION_1_4) => {
+        vkMapMemory2: vk::PFN_vkMapMemory2KHR;
+        vkUnmapMemory2: vk::PFN_vkUnmapMemory2KHR;
+        vkGetDeviceImageSubresourceLayout: vk::PFN_vkGetDeviceImageSubresourceLayoutKHR;
+        vkGetImageSubresourceLayout2: vk::PFN_vkGetImageSubresourceLayout2KHR;
+        vkCopyMemoryToImage: vk::PFN_vkCopyMemoryToImageEXT;
+        vkCopyImageToMemory: vk::PFN_vkCopyImageToMemoryEXT;
+        vkCopyImageToImage: vk::PFN_vkCopyImageToImageEXT;
+        vkTransitionImageLayout: vk::PFN_vkTransitionImageLayoutEXT;
+        vkCmdPushDescriptorSet: vk::PFN_vkCmdPushDescriptorSetKHR;
+        vkCmdPushDescriptorSetWithTemplate: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR;
+        vkCmdBindDescriptorSets2: vk::PFN_vkCmdBindDescriptorSets2KHR;
+        vkCmdPushConstants2: vk::PFN_vkCmdPushConstants2KHR;
+        vkCmdPushDescriptorSet2: vk::PFN_vkCmdPushDescriptorSet2KHR;
+        vkCmdPushDescriptorSetWithTemplate2: vk::PFN_vkCmdPushDescriptorSetWithTemplate2KHR;
+        vkCmdSetLineStipple: vk::PFN_vkCmdSetLineStippleKHR;
+        vkCmdBindIndexBuffer2: vk::PFN_vkCmdBindIndexBuffer2KHR;
+        vkGetRenderingAreaGranularity: vk::PFN_vkGetRenderingAreaGranularityKHR;
+        vkCmdSetRenderingAttachmentLocations: vk::PFN_vkCmdSetRenderingAttachmentLocationsKHR;
+        vkCmdSetRenderingInputAttachmentIndices: vk::PFN_vkCmdSetRenderingInputAttachmentIndicesKHR;
+    }
     Device, DeviceExtension(&[c"VK_EXT_attachment_feedback_loop_dynamic_state"]) => {
         vkCmdSetAttachmentFeedbackLoopEnableEXT: vk::PFN_vkCmdSetAttachmentFeedbackLoopEnableEXT;
     }
@@ -358,11 +380,18 @@ static ROWS: &[Command] = rows! {
     Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
         vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT;
     }
+    Device, DeviceExtension(&[c"VK_EXT_host_image_copy"]) => {
+        vkCopyMemoryToImageEXT = vkCopyMemoryToImage;
+        vkCopyImageToMemoryEXT = vkCopyImageToMemory;
+        vkCopyImageToImageEXT = vkCopyImageToImage;
+        vkTransitionImageLayoutEXT = vkTransitionImageLayout;
+        vkGetImageSubresourceLayout2EXT = vkGetImageSubresourceLayout2;
+    }
     Device, DeviceExtension(&[c"VK_EXT_host_query_reset"]) => {
         vkResetQueryPoolEXT = vkResetQueryPool;
     }
     Device, DeviceExtension(&[c"VK_EXT_line_rasterization"]) => {
-        vkCmdSetLineStippleEXT: vk::PFN_vkCmdSetLineStippleKHR;
+        vkCmdSetLineStippleEXT = vkCmdSetLineStipple;
     }
     Device, DeviceExtension(&[c"VK_EXT_multi_draw"]) => {
         vkCmdDrawMultiEXT: vk::PFN_vkCmdDrawMultiEXT;
@@ -440,7 +469,7 @@ static ROWS: &[Command] = rows! {
         vkUpdateDescriptorSetWithTemplateKHR = vkUpdateDescriptorSetWithTemplate;
     }
     Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template", c"VK_KHR_push_descriptor"]) => {
-        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR;
+        vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplate;
     }
     Device, DeviceExtension(&[c"VK_KHR_device_group"]) => {
         vkGetDeviceGroupPeerMemoryFeaturesKHR = vkGetDeviceGroupPeerMemoryFeatures;
@@ -467,8 +496,8 @@ static ROWS: &[Command] = rows! {
         vkCmdEndRenderingKHR = vkCmdEndRendering;
     }
     Device, DeviceExtension(&[c"VK_KHR_dynamic_rendering_local_read"]) => {
-        vkCmdSetRenderingAttachmentLocationsKHR: vk::PFN_vkCmdSetRenderingAttachmentLocationsKHR;
-        vkCmdSetRenderingInputAttachmentIndicesKHR: vk::PFN_vkCmdSetRenderingInputAttachmentIndicesKHR;
+        vkCmdSetRenderingAttachmentLocationsKHR = vkCmdSetRenderingAttachmentLocations;
+        vkCmdSetRenderingInputAttachmentIndicesKHR = vkCmdSetRenderingInputAttachmentIndices;
     }
     PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_fence_capabilities"]) => {
         vkGetPhysicalDeviceExternalFencePropertiesKHR = vkGetPhysicalDeviceExternalFenceProperties;
@@ -510,7 +539,7 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceSurfaceFormats2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceFormats2KHR;
     }
     Device, DeviceExtension(&[c"VK_KHR_line_rasterization"]) => {
-        vkCmdSetLineStippleKHR = vkCmdSetLineStippleEXT;
+        vkCmdSetLineStippleKHR = vkCmdSetLineStipple;
     }
     Device, DeviceExtension(&[c"VK_KHR_maintenance1"]) => {
         vkTrimCommandPoolKHR = vkTrimCommandPool;
@@ -524,20 +553,20 @@ static ROWS: &[Command] = rows! {
         vkGetDeviceImageSparseMemoryRequirementsKHR = vkGetDeviceImageSparseMemoryRequirements;
     }
     Device, DeviceExtension(&[c"VK_KHR_maintenance5"]) => {
-        vkCmdBindIndexBuffer2KHR: vk::PFN_vkCmdBindIndexBuffer2KHR;
-        vkGetRenderingAreaGranularityKHR: vk::PFN_vkGetRenderingAreaGranularityKHR;
-        vkGetDeviceImageSubresourceLayoutKHR: vk::PFN_vkGetDeviceImageSubresourceLayoutKHR;
-        vkGetImageSubresourceLayout2KHR: vk::PFN_vkGetImageSubresourceLayout2KHR;
+        vkCmdBindIndexBuffer2KHR = vkCmdBindIndexBuffer2;
+        vkGetRenderingAreaGranularityKHR = vkGetRenderingAreaGranularity;
+        vkGetDeviceImageSubresourceLayoutKHR = vkGetDeviceImageSubresourceLayout;
+        vkGetImageSubresourceLayout2KHR = vkGetImageSubresourceLayout2;
     }
     Device, DeviceExtension(&[c"VK_KHR_maintenance6"]) => {
-        vkCmdBindDescriptorSets2KHR: vk::PFN_vkCmdBindDescriptorSets2KHR;
-        vkCmdPushConstants2KHR: vk::PFN_vkCmdPushConstants2KHR;
-        vkCmdPushDescriptorSet2KHR: vk::PFN_vkCmdPushDescriptorSet2KHR;
-        vkCmdPushDescriptorSetWithTemplate2KHR: vk::PFN_vkCmdPushDescriptorSetWithTemplate2KHR;
+        vkCmdBindDescriptorSets2KHR = vkCmdBindDescriptorSets2;
+        vkCmdPushConstants2KHR = vkCmdPushConstants2;
+        vkCmdPushDescriptorSet2KHR = vkCmdPushDescriptorSet2;
+        vkCmdPushDescriptorSetWithTemplate2KHR = vkCmdPushDescriptorSetWithTemplate2;
     }
     Device, DeviceExtension(&[c"VK_KHR_map_memory2"]) => {
-        vkMapMemory2KHR: vk::PFN_vkMapMemory2KHR;
-        vkUnmapMemory2KHR: vk::PFN_vkUnmapMemory2KHR;
+        vkMapMemory2KHR = vkMapMemory2;
+        vkUnmapMemory2KHR = vkUnmapMemory2;
     }
     PhysicalDevice, DeviceExtension(&[c"VK_KHR_performance_query"]) => {
         vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR:
@@ -550,7 +579,7 @@ static ROWS: &[Command] = rows! {
         vkReleaseProfilingLockKHR: vk::PFN_vkReleaseProfilingLockKHR;
     }
     Device, DeviceExtension(&[c"VK_KHR_push_descriptor"]) => {
-        vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR;
+        vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSet;
     }
     Device, DeviceExtension(&[c"VK_KHR_sampler_ycbcr_conversion"]) => {
         vkCreateSamplerYcbcrConversionKHR = vkCreateSamplerYcbcrConversion;
@@ -3549,6 +3578,286 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     }
 }
 
+unsafe extern "system" fn vkMapMemory2(
+    device: vk::Device,
+    p_memory_map_info: *const vk::MemoryMapInfoKHR<'_>,
+    pp_data: *mut *mut std::ffi::c_void,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkMapMemory2", || unsafe {
+        let info = valid::input(p_memory_map_info)?;
+        let data = resource::memory::map_memory(handle::get(info.memory)?, info.offset, info.size)?;
+        valid::output(pp_data, data)
+    })
+}
+
+unsafe extern "system" fn vkUnmapMemory2(
+    device: vk::Device,
+    p_memory_unmap_info: *const vk::MemoryUnmapInfoKHR<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkUnmapMemory2", || unsafe {
+        let info = valid::input(p_memory_unmap_info)?;
+        resource::memory::unmap_memory(handle::get(info.memory)?)
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceImageSubresourceLayout(
+    device: vk::Device,
+    p_info: *const vk::DeviceImageSubresourceInfoKHR<'_>,
+    p_layout: *mut vk::SubresourceLayout2KHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetDeviceImageSubresourceLayout", || unsafe {
+        let info = valid::input(p_info)?;
+        resource::image::get_device_image_subresource_layout(
+            valid::input(info.p_create_info)?,
+            valid::input(info.p_subresource)?,
+            OutputChain::new(p_layout)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkGetImageSubresourceLayout2(
+    device: vk::Device,
+    image: vk::Image,
+    p_subresource: *const vk::ImageSubresource2KHR<'_>,
+    p_layout: *mut vk::SubresourceLayout2KHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetImageSubresourceLayout2", || unsafe {
+        resource::image::get_image_subresource_layout2(
+            handle::get(image)?,
+            valid::input(p_subresource)?,
+            OutputChain::new(p_layout)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkCopyMemoryToImage(
+    device: vk::Device,
+    p_copy_memory_to_image_info: *const vk::CopyMemoryToImageInfoEXT<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkCopyMemoryToImage", || unsafe {
+        let info = valid::input(p_copy_memory_to_image_info)?;
+        command::host_image_copy::copy_memory_to_image(
+            handle::get(info.dst_image)?,
+            valid::slice(info.p_regions, info.region_count)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkCopyImageToMemory(
+    device: vk::Device,
+    p_copy_image_to_memory_info: *const vk::CopyImageToMemoryInfoEXT<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkCopyImageToMemory", || unsafe {
+        let info = valid::input(p_copy_image_to_memory_info)?;
+        command::host_image_copy::copy_image_to_memory(
+            handle::get(info.src_image)?,
+            valid::slice(info.p_regions, info.region_count)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkCopyImageToImage(
+    device: vk::Device,
+    p_copy_image_to_image_info: *const vk::CopyImageToImageInfoEXT<'_>,
+) -> vk::Result {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkCopyImageToImage", || unsafe {
+        let info = valid::input(p_copy_image_to_image_info)?;
+        command::host_image_copy::copy_image_to_image(
+            handle::get(info.src_image)?,
+            handle::get(info.dst_image)?,
+            valid::slice(info.p_regions, info.region_count)?,
+        )
+    })
+}
+
+unsafe extern "system" fn vkTransitionImageLayout(
+    device: vk::Device,
+    _: u32,
+    _: *const vk::HostImageLayoutTransitionInfoEXT<'_>,
+) -> vk::Result {
+    guard(device, "vkTransitionImageLayout", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSet(
+    command_buffer: vk::CommandBuffer,
+    pipeline_bind_point: vk::PipelineBindPoint,
+    layout: vk::PipelineLayout,
+    set: u32,
+    descriptor_write_count: u32,
+    p_descriptor_writes: *const vk::WriteDescriptorSet<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushDescriptorSet", |recorder| {
+            command::bind::cmd_push_descriptor_set(
+                recorder,
+                pipeline_bind_point,
+                handle::get(layout)?,
+                set,
+                valid::slice(p_descriptor_writes, descriptor_write_count)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplate(
+    command_buffer: vk::CommandBuffer,
+    descriptor_update_template: vk::DescriptorUpdateTemplate,
+    layout: vk::PipelineLayout,
+    set: u32,
+    p_data: *const std::ffi::c_void,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushDescriptorSetWithTemplate", |recorder| {
+            command::bind::cmd_push_descriptor_set_with_template(
+                recorder,
+                handle::get(descriptor_update_template)?,
+                handle::get(layout)?,
+                set,
+                p_data,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdBindDescriptorSets2(
+    command_buffer: vk::CommandBuffer,
+    p_bind_descriptor_sets_info: *const vk::BindDescriptorSetsInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdBindDescriptorSets2", |recorder| {
+            let info = valid::input(p_bind_descriptor_sets_info)?;
+            command::bind::cmd_bind_descriptor_sets2(
+                recorder,
+                info.stage_flags,
+                handle::get(info.layout)?,
+                info.first_set,
+                handle::Handles::new(valid::slice(info.p_descriptor_sets, info.descriptor_set_count)?),
+                valid::slice(info.p_dynamic_offsets, info.dynamic_offset_count)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushConstants2(
+    command_buffer: vk::CommandBuffer,
+    p_push_constants_info: *const vk::PushConstantsInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushConstants2", |recorder| {
+            let info = valid::input(p_push_constants_info)?;
+            command::bind::cmd_push_constants(
+                recorder,
+                handle::get(info.layout)?,
+                info.offset,
+                valid::slice(info.p_values.cast::<u8>(), info.size)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSet2(
+    command_buffer: vk::CommandBuffer,
+    p_push_descriptor_set_info: *const vk::PushDescriptorSetInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushDescriptorSet2", |recorder| {
+            let info = valid::input(p_push_descriptor_set_info)?;
+            command::bind::cmd_push_descriptor_set2(
+                recorder,
+                info.stage_flags,
+                handle::get(info.layout)?,
+                info.set,
+                valid::slice(info.p_descriptor_writes, info.descriptor_write_count)?,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplate2(
+    command_buffer: vk::CommandBuffer,
+    p_push_descriptor_set_with_template_info: *const vk::PushDescriptorSetWithTemplateInfoKHR<'_>,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdPushDescriptorSetWithTemplate2", |recorder| {
+            let info = valid::input(p_push_descriptor_set_with_template_info)?;
+            command::bind::cmd_push_descriptor_set_with_template(
+                recorder,
+                handle::get(info.descriptor_update_template)?,
+                handle::get(info.layout)?,
+                info.set,
+                info.p_data,
+            )
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdSetLineStipple(
+    command_buffer: vk::CommandBuffer,
+    line_stipple_factor: u32,
+    line_stipple_pattern: u16,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdSetLineStipple", |recorder| {
+            command::dynamic_state::cmd_set_line_stipple(recorder, line_stipple_factor, line_stipple_pattern)
+        })
+    }
+}
+
+unsafe extern "system" fn vkCmdBindIndexBuffer2(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    size: vk::DeviceSize,
+    index_type: vk::IndexType,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    unsafe {
+        record(command_buffer, "vkCmdBindIndexBuffer2", |recorder| {
+            command::bind::cmd_bind_index_buffer2(recorder, handle::get_optional(buffer)?, offset, size, index_type)
+        })
+    }
+}
+
+unsafe extern "system" fn vkGetRenderingAreaGranularity(
+    device: vk::Device,
+    _: *const vk::RenderingAreaInfoKHR<'_>,
+    p_granularity: *mut vk::Extent2D,
+) {
+    // SAFETY: the application follows Vulkan's valid usage.
+    guard(device, "vkGetRenderingAreaGranularity", || unsafe {
+        let granularity = render_pass::get_render_area_granularity()?;
+        valid::output(p_granularity, granularity)
+    })
+}
+
+unsafe extern "system" fn vkCmdSetRenderingAttachmentLocations(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::RenderingAttachmentLocationInfoKHR<'_>,
+) {
+    guard(command_buffer, "vkCmdSetRenderingAttachmentLocations", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdSetRenderingInputAttachmentIndices(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::RenderingInputAttachmentIndexInfoKHR<'_>,
+) {
+    guard(command_buffer, "vkCmdSetRenderingInputAttachmentIndices", || Ok(()))
+}
+
 unsafe extern "system" fn vkCmdSetAttachmentFeedbackLoopEnableEXT(
     command_buffer: vk::CommandBuffer,
     _: vk::ImageAspectFlags,
@@ -4089,19 +4398,6 @@ unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
     })
 }
 
-unsafe extern "system" fn vkCmdSetLineStippleEXT(
-    command_buffer: vk::CommandBuffer,
-    line_stipple_factor: u32,
-    line_stipple_pattern: u16,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdSetLineStippleEXT", |recorder| {
-            command::dynamic_state::cmd_set_line_stipple(recorder, line_stipple_factor, line_stipple_pattern)
-        })
-    }
-}
-
 unsafe extern "system" fn vkCmdDrawMultiEXT(
     command_buffer: vk::CommandBuffer,
     draw_count: u32,
@@ -4464,27 +4760,6 @@ unsafe extern "system" fn vkCmdSetGaussianContributionBudgetGAURAST(
     }
 }
 
-unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
-    command_buffer: vk::CommandBuffer,
-    descriptor_update_template: vk::DescriptorUpdateTemplate,
-    layout: vk::PipelineLayout,
-    set: u32,
-    p_data: *const std::ffi::c_void,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdPushDescriptorSetWithTemplateKHR", |recorder| {
-            command::bind::cmd_push_descriptor_set_with_template(
-                recorder,
-                handle::get(descriptor_update_template)?,
-                handle::get(layout)?,
-                set,
-                p_data,
-            )
-        })
-    }
-}
-
 unsafe extern "system" fn vkGetDeviceGroupPresentCapabilitiesKHR(
     device: vk::Device,
     p_device_group_present_capabilities: *mut vk::DeviceGroupPresentCapabilitiesKHR<'_>,
@@ -4536,20 +4811,6 @@ unsafe extern "system" fn vkAcquireNextImage2KHR(
             valid::output_structure(p_image_index)?,
         )
     })
-}
-
-unsafe extern "system" fn vkCmdSetRenderingAttachmentLocationsKHR(
-    command_buffer: vk::CommandBuffer,
-    _: *const vk::RenderingAttachmentLocationInfoKHR<'_>,
-) {
-    guard(command_buffer, "vkCmdSetRenderingAttachmentLocationsKHR", || Ok(()))
-}
-
-unsafe extern "system" fn vkCmdSetRenderingInputAttachmentIndicesKHR(
-    command_buffer: vk::CommandBuffer,
-    _: *const vk::RenderingInputAttachmentIndexInfoKHR<'_>,
-) {
-    guard(command_buffer, "vkCmdSetRenderingInputAttachmentIndicesKHR", || Ok(()))
 }
 
 unsafe extern "system" fn vkImportFenceFdKHR(
@@ -4649,165 +4910,6 @@ unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormats2KHR(
     })
 }
 
-unsafe extern "system" fn vkCmdBindIndexBuffer2KHR(
-    command_buffer: vk::CommandBuffer,
-    buffer: vk::Buffer,
-    offset: vk::DeviceSize,
-    size: vk::DeviceSize,
-    index_type: vk::IndexType,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdBindIndexBuffer2KHR", |recorder| {
-            command::bind::cmd_bind_index_buffer2(recorder, handle::get_optional(buffer)?, offset, size, index_type)
-        })
-    }
-}
-
-unsafe extern "system" fn vkGetRenderingAreaGranularityKHR(
-    device: vk::Device,
-    _: *const vk::RenderingAreaInfoKHR<'_>,
-    p_granularity: *mut vk::Extent2D,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    guard(device, "vkGetRenderingAreaGranularityKHR", || unsafe {
-        let granularity = render_pass::get_render_area_granularity()?;
-        valid::output(p_granularity, granularity)
-    })
-}
-
-unsafe extern "system" fn vkGetDeviceImageSubresourceLayoutKHR(
-    device: vk::Device,
-    p_info: *const vk::DeviceImageSubresourceInfoKHR<'_>,
-    p_layout: *mut vk::SubresourceLayout2KHR<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    guard(device, "vkGetDeviceImageSubresourceLayoutKHR", || unsafe {
-        let info = valid::input(p_info)?;
-        resource::image::get_device_image_subresource_layout(
-            valid::input(info.p_create_info)?,
-            valid::input(info.p_subresource)?,
-            valid::output_structure(p_layout)?,
-        )
-    })
-}
-
-unsafe extern "system" fn vkGetImageSubresourceLayout2KHR(
-    device: vk::Device,
-    image: vk::Image,
-    p_subresource: *const vk::ImageSubresource2KHR<'_>,
-    p_layout: *mut vk::SubresourceLayout2KHR<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    guard(device, "vkGetImageSubresourceLayout2KHR", || unsafe {
-        resource::image::get_image_subresource_layout2(
-            handle::get(image)?,
-            valid::input(p_subresource)?,
-            valid::output_structure(p_layout)?,
-        )
-    })
-}
-
-unsafe extern "system" fn vkCmdBindDescriptorSets2KHR(
-    command_buffer: vk::CommandBuffer,
-    p_bind_descriptor_sets_info: *const vk::BindDescriptorSetsInfoKHR<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdBindDescriptorSets2KHR", |recorder| {
-            let info = valid::input(p_bind_descriptor_sets_info)?;
-            command::bind::cmd_bind_descriptor_sets2(
-                recorder,
-                info.stage_flags,
-                handle::get(info.layout)?,
-                info.first_set,
-                handle::Handles::new(valid::slice(info.p_descriptor_sets, info.descriptor_set_count)?),
-                valid::slice(info.p_dynamic_offsets, info.dynamic_offset_count)?,
-            )
-        })
-    }
-}
-
-unsafe extern "system" fn vkCmdPushConstants2KHR(
-    command_buffer: vk::CommandBuffer,
-    p_push_constants_info: *const vk::PushConstantsInfoKHR<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdPushConstants2KHR", |recorder| {
-            let info = valid::input(p_push_constants_info)?;
-            command::bind::cmd_push_constants(
-                recorder,
-                handle::get(info.layout)?,
-                info.offset,
-                valid::slice(info.p_values.cast::<u8>(), info.size)?,
-            )
-        })
-    }
-}
-
-unsafe extern "system" fn vkCmdPushDescriptorSet2KHR(
-    command_buffer: vk::CommandBuffer,
-    p_push_descriptor_set_info: *const vk::PushDescriptorSetInfoKHR<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdPushDescriptorSet2KHR", |recorder| {
-            let info = valid::input(p_push_descriptor_set_info)?;
-            command::bind::cmd_push_descriptor_set2(
-                recorder,
-                info.stage_flags,
-                handle::get(info.layout)?,
-                info.set,
-                valid::slice(info.p_descriptor_writes, info.descriptor_write_count)?,
-            )
-        })
-    }
-}
-
-unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplate2KHR(
-    command_buffer: vk::CommandBuffer,
-    p_push_descriptor_set_with_template_info: *const vk::PushDescriptorSetWithTemplateInfoKHR<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdPushDescriptorSetWithTemplate2KHR", |recorder| {
-            let info = valid::input(p_push_descriptor_set_with_template_info)?;
-            command::bind::cmd_push_descriptor_set_with_template(
-                recorder,
-                handle::get(info.descriptor_update_template)?,
-                handle::get(info.layout)?,
-                info.set,
-                info.p_data,
-            )
-        })
-    }
-}
-
-unsafe extern "system" fn vkMapMemory2KHR(
-    device: vk::Device,
-    p_memory_map_info: *const vk::MemoryMapInfoKHR<'_>,
-    pp_data: *mut *mut std::ffi::c_void,
-) -> vk::Result {
-    // SAFETY: the application follows Vulkan's valid usage.
-    guard(device, "vkMapMemory2KHR", || unsafe {
-        let info = valid::input(p_memory_map_info)?;
-        let data = resource::memory::map_memory(handle::get(info.memory)?, info.offset, info.size)?;
-        valid::output(pp_data, data)
-    })
-}
-
-unsafe extern "system" fn vkUnmapMemory2KHR(
-    device: vk::Device,
-    p_memory_unmap_info: *const vk::MemoryUnmapInfoKHR<'_>,
-) -> vk::Result {
-    // SAFETY: the application follows Vulkan's valid usage.
-    guard(device, "vkUnmapMemory2KHR", || unsafe {
-        let info = valid::input(p_memory_unmap_info)?;
-        resource::memory::unmap_memory(handle::get(info.memory)?)
-    })
-}
-
 unsafe extern "system" fn vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR(
     physical_device: vk::PhysicalDevice,
     queue_family_index: u32,
@@ -4848,28 +4950,6 @@ unsafe extern "system" fn vkAcquireProfilingLockKHR(
 
 unsafe extern "system" fn vkReleaseProfilingLockKHR(device: vk::Device) {
     guard(device, "vkReleaseProfilingLockKHR", || Ok(()))
-}
-
-unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
-    command_buffer: vk::CommandBuffer,
-    pipeline_bind_point: vk::PipelineBindPoint,
-    layout: vk::PipelineLayout,
-    set: u32,
-    descriptor_write_count: u32,
-    p_descriptor_writes: *const vk::WriteDescriptorSet<'_>,
-) {
-    // SAFETY: the application follows Vulkan's valid usage.
-    unsafe {
-        record(command_buffer, "vkCmdPushDescriptorSetKHR", |recorder| {
-            command::bind::cmd_push_descriptor_set(
-                recorder,
-                pipeline_bind_point,
-                handle::get(layout)?,
-                set,
-                valid::slice(p_descriptor_writes, descriptor_write_count)?,
-            )
-        })
-    }
 }
 
 unsafe extern "system" fn vkDestroySurfaceKHR(

@@ -189,6 +189,9 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
 pub(crate) fn features2(format: vk::Format, features: vk::FormatFeatureFlags) -> vk::FormatFeatureFlags2 {
     // The 64-bit features begin with the 32-bit ones.
     let mut wide = vk::FormatFeatureFlags2::from_raw(features.as_raw().into());
+    if features.contains(vk::FormatFeatureFlags::TRANSFER_SRC) {
+        wide |= vk::FormatFeatureFlags2::HOST_IMAGE_TRANSFER_EXT;
+    }
     let stored = vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
     if features.intersects(stored) {
         wide |= vk::FormatFeatureFlags2::STORAGE_READ_WITHOUT_FORMAT
@@ -219,6 +222,8 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
 const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
     (vk::ImageUsageFlags::TRANSFER_SRC, vk::FormatFeatureFlags::TRANSFER_SRC),
     (vk::ImageUsageFlags::TRANSFER_DST, vk::FormatFeatureFlags::TRANSFER_DST),
+    // The host copies what a queue copies.
+    (vk::ImageUsageFlags::HOST_TRANSFER_EXT, vk::FormatFeatureFlags::TRANSFER_SRC),
     (vk::ImageUsageFlags::SAMPLED, vk::FormatFeatureFlags::SAMPLED_IMAGE),
     (vk::ImageUsageFlags::STORAGE, vk::FormatFeatureFlags::STORAGE_IMAGE),
     (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::FormatFeatureFlags::COLOR_ATTACHMENT),

@@ -447,6 +447,8 @@ fn find_properties() -> Properties {
         graphics_pipeline_library_fast_linking: false,
         // The fragment stage alone says how its inputs are interpolated.
         graphics_pipeline_library_independent_interpolation_decoration: true,
+        optimal_tiling_layout_uuid: identity()[0],
+        identical_memory_type_requirements: true,
         max_vertex_attrib_divisor: u32::MAX,
         supports_non_zero_first_instance: true,
         early_fragment_multisample_coverage_after_sample_counting: true,
@@ -458,6 +460,8 @@ fn find_properties() -> Properties {
         non_strict_wide_lines_use_parallelogram: false,
         block_texel_view_compatible_multiple_layers: false,
         max_combined_image_sampler_descriptor_count: 1,
+        dynamic_rendering_local_read_depth_stencil_attachments: true,
+        dynamic_rendering_local_read_multisampled_attachments: true,
         fragment_shading_rate_clamp_combiner_inputs: false,
         // The device knows no less robust access.
         default_robustness_storage_buffers: vk::PipelineRobustnessBufferBehaviorEXT::ROBUST_BUFFER_ACCESS_2,

@@ -11,7 +11,7 @@ use crate::abi::error::Error;
 use crate::abi::valid::{self, ChainedOutput, OutputChain, Structures};
 use crate::instance::extension_properties;
 use crate::options;
-use crate::registry::{self, features::SUPPORTED};
+use crate::registry::{self, features::SUPPORTED, newer};
 use ash::vk;
 use std::ffi::CStr;
 
@@ -77,8 +77,51 @@ pub(crate) fn get_physical_device_properties2(
     mut properties: OutputChain<'_, vk::PhysicalDeviceProperties2<'_>>,
 ) -> Result<(), Error> {
     properties.properties = core_properties();
-    properties.for_each_chained(|out| limits::properties().write(out));
+    properties.for_each_chained(|mut out| {
+        write_copied_layouts(&mut out);
+        limits::properties().write(out);
+    });
     Ok(())
+}
+
+/// The image layouts from which and to which the host copies: all, since they don't matter to the device.
+const COPIED_LAYOUTS: [vk::ImageLayout; 16] = {
+    use vk::ImageLayout as L;
+    [
+        L::GENERAL,
+        L::COLOR_ATTACHMENT_OPTIMAL,
+        L::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+        L::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
+        L::SHADER_READ_ONLY_OPTIMAL,
+        L::TRANSFER_SRC_OPTIMAL,
+        L::TRANSFER_DST_OPTIMAL,
+        L::DEPTH_READ_ONLY_STENCIL_ATTACHMENT_OPTIMAL,
+        L::DEPTH_ATTACHMENT_STENCIL_READ_ONLY_OPTIMAL,
+        L::DEPTH_ATTACHMENT_OPTIMAL,
+        L::DEPTH_READ_ONLY_OPTIMAL,
+        L::STENCIL_ATTACHMENT_OPTIMAL,
+        L::STENCIL_READ_ONLY_OPTIMAL,
+        L::READ_ONLY_OPTIMAL,
+        L::ATTACHMENT_OPTIMAL,
+        L::PRESENT_SRC_KHR,
+    ]
+};
+
+/// Writes the lists of a structure in the chain of properties.
+fn write_copied_layouts(structure: &mut ChainedOutput<'_>) {
+    let write = |count: &mut u32, layouts| {
+        // SAFETY: the application lends as many elements as it says, or none.
+        unsafe { valid::enumerate(count, layouts, &COPIED_LAYOUTS) }
+    };
+    // The counts are not null, so that nothing fails; a list that is too short gets what fits.
+    if let Some(out) = structure.cast::<newer::PhysicalDeviceVulkan14Properties>() {
+        let _ = write(&mut out.copy_src_layout_count, out.p_copy_src_layouts);
+        let _ = write(&mut out.copy_dst_layout_count, out.p_copy_dst_layouts);
+    }
+    if let Some(out) = structure.cast::<vk::PhysicalDeviceHostImageCopyPropertiesEXT<'_>>() {
+        let _ = write(&mut out.copy_src_layout_count, out.p_copy_src_layouts);
+        let _ = write(&mut out.copy_dst_layout_count, out.p_copy_dst_layouts);
+    }
 }
 
 #[doc(alias = "vkGetPhysicalDeviceFeatures")]
@@ -159,6 +202,11 @@ pub(crate) unsafe fn get_physical_device_image_format_properties2(
     image_format_properties.for_each_chained(|mut structure| {
         if let Some(out) = structure.cast::<vk::SamplerYcbcrConversionImageFormatProperties<'_>>() {
             out.combined_image_sampler_descriptor_count = 1;
+        }
+        if let Some(out) = structure.cast::<vk::HostImageCopyDevicePerformanceQueryEXT<'_>>() {
+            // Every image is stored in one way.
+            out.optimal_device_access = vk::TRUE;
+            out.identical_memory_layout = vk::TRUE;
         }
     });
     // SAFETY: the caller's promise.

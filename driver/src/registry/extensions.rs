@@ -54,6 +54,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_global_priority", 2),
     (c"VK_EXT_global_priority_query", 1),
     (c"VK_EXT_graphics_pipeline_library", 1),
+    (c"VK_EXT_host_image_copy", 1),
     (c"VK_EXT_host_query_reset", 1),
     (c"VK_EXT_image_2d_view_of_3d", 1),
     (c"VK_EXT_image_robustness", 1),

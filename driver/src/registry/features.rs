@@ -11,47 +11,47 @@ use std::ffi::CStr;
 features! {
     core vk::PhysicalDeviceFeatures {
         robustBufferAccess => robust_buffer_access: true, mandatory 1.0;
-        fullDrawIndexUint32 => full_draw_index_uint32: true;
-        imageCubeArray => image_cube_array: true;
-        independentBlend => independent_blend: true;
+        fullDrawIndexUint32 => full_draw_index_uint32: true, mandatory 1.4;
+        imageCubeArray => image_cube_array: true, mandatory 1.4;
+        independentBlend => independent_blend: true, mandatory 1.4;
         geometryShader => geometry_shader: true;
         tessellationShader => tessellation_shader: true;
-        sampleRateShading => sample_rate_shading: true;
+        sampleRateShading => sample_rate_shading: true, mandatory 1.4;
         dualSrcBlend => dual_src_blend: true;
         logicOp => logic_op: true;
         multiDrawIndirect => multi_draw_indirect: true;
-        drawIndirectFirstInstance => draw_indirect_first_instance: true;
-        depthClamp => depth_clamp: true;
-        depthBiasClamp => depth_bias_clamp: true;
+        drawIndirectFirstInstance => draw_indirect_first_instance: true, mandatory 1.4;
+        depthClamp => depth_clamp: true, mandatory 1.4;
+        depthBiasClamp => depth_bias_clamp: true, mandatory 1.4;
         fillModeNonSolid => fill_mode_non_solid: true;
         depthBounds => depth_bounds: true;
         wideLines => wide_lines: true;
-        largePoints => large_points: true;
+        largePoints => large_points: true, mandatory 1.4;
         alphaToOne => alpha_to_one: true;
         multiViewport => multi_viewport: true;
-        samplerAnisotropy => sampler_anisotropy: true;
+        samplerAnisotropy => sampler_anisotropy: true, mandatory 1.4;
         textureCompressionETC2 => texture_compression_etc2: true;
         textureCompressionASTC_LDR => texture_compression_astc_ldr: true;
         textureCompressionBC => texture_compression_bc: true;
         occlusionQueryPrecise => occlusion_query_precise: true;
         pipelineStatisticsQuery => pipeline_statistics_query: true;
         vertexPipelineStoresAndAtomics => vertex_pipeline_stores_and_atomics: true;
-        fragmentStoresAndAtomics => fragment_stores_and_atomics: true;
+        fragmentStoresAndAtomics => fragment_stores_and_atomics: true, mandatory 1.4;
         shaderTessellationAndGeometryPointSize => shader_tessellation_and_geometry_point_size: true;
-        shaderImageGatherExtended => shader_image_gather_extended: true;
-        shaderStorageImageExtendedFormats => shader_storage_image_extended_formats: true;
+        shaderImageGatherExtended => shader_image_gather_extended: true, mandatory 1.4;
+        shaderStorageImageExtendedFormats => shader_storage_image_extended_formats: true, mandatory 1.4;
         shaderStorageImageMultisample => shader_storage_image_multisample: true;
         shaderStorageImageReadWithoutFormat => shader_storage_image_read_without_format: true;
         shaderStorageImageWriteWithoutFormat => shader_storage_image_write_without_format: true;
-        shaderUniformBufferArrayDynamicIndexing => shader_uniform_buffer_array_dynamic_indexing: true;
+        shaderUniformBufferArrayDynamicIndexing => shader_uniform_buffer_array_dynamic_indexing: true, mandatory 1.4;
         shaderSampledImageArrayDynamicIndexing => shader_sampled_image_array_dynamic_indexing: true, mandatory 1.2;
         shaderStorageBufferArrayDynamicIndexing => shader_storage_buffer_array_dynamic_indexing: true, mandatory 1.2;
-        shaderStorageImageArrayDynamicIndexing => shader_storage_image_array_dynamic_indexing: true;
+        shaderStorageImageArrayDynamicIndexing => shader_storage_image_array_dynamic_indexing: true, mandatory 1.4;
         shaderClipDistance => shader_clip_distance: true;
         shaderCullDistance => shader_cull_distance: true;
         shaderFloat64 => shader_float64: true;
         shaderInt64 => shader_int64: true, mandatory 1.2;
-        shaderInt16 => shader_int16: true;
+        shaderInt16 => shader_int16: true, mandatory 1.4;
         shaderResourceResidency => shader_resource_residency: false;
         shaderResourceMinLod => shader_resource_min_lod: true;
         sparseBinding => sparse_binding: false;
@@ -74,10 +74,10 @@ features! {
         multiview => multiview: true, mandatory 1.1;
         multiviewGeometryShader => multiview_geometry_shader: true;
         multiviewTessellationShader => multiview_tessellation_shader: true;
-        variablePointersStorageBuffer => variable_pointers_storage_buffer: true;
-        variablePointers => variable_pointers: true;
+        variablePointersStorageBuffer => variable_pointers_storage_buffer: true, mandatory 1.4;
+        variablePointers => variable_pointers: true, mandatory 1.4;
         protectedMemory => protected_memory: false;
-        samplerYcbcrConversion => sampler_ycbcr_conversion: true;
+        samplerYcbcrConversion => sampler_ycbcr_conversion: true, mandatory 1.4;
         shaderDrawParameters => shader_draw_parameters: true, mandatory 1.1;
     }
     structure vk::PhysicalDeviceVulkan12Features {
@@ -89,7 +89,7 @@ features! {
         shaderBufferInt64Atomics => shader_buffer_int64_atomics: true;
         shaderSharedInt64Atomics => shader_shared_int64_atomics: true;
         shaderFloat16 => shader_float16: true;
-        shaderInt8 => shader_int8: true;
+        shaderInt8 => shader_int8: true, mandatory 1.4;
         descriptorIndexing => descriptor_indexing: true, mandatory 1.2;
         shaderInputAttachmentArrayDynamicIndexing => shader_input_attachment_array_dynamic_indexing: false;
         shaderUniformTexelBufferArrayDynamicIndexing =>
@@ -123,7 +123,7 @@ features! {
         descriptorBindingVariableDescriptorCount => descriptor_binding_variable_descriptor_count: true;
         runtimeDescriptorArray => runtime_descriptor_array: true, mandatory 1.2;
         samplerFilterMinmax => sampler_filter_minmax: true, mandatory 1.2;
-        scalarBlockLayout => scalar_block_layout: true;
+        scalarBlockLayout => scalar_block_layout: true, mandatory 1.4;
         imagelessFramebuffer => imageless_framebuffer: true, mandatory 1.2;
         uniformBufferStandardLayout => uniform_buffer_standard_layout: true, mandatory 1.2;
         shaderSubgroupExtendedTypes => shader_subgroup_extended_types: true, mandatory 1.2;
@@ -157,6 +157,29 @@ features! {
         dynamicRendering => dynamic_rendering: true, mandatory 1.3;
         shaderIntegerDotProduct => shader_integer_dot_product: true, mandatory 1.3;
         maintenance4 => maintenance4: true, mandatory 1.3;
+    }
+    structure crate::registry::newer::PhysicalDeviceVulkan14Features {
+        globalPriorityQuery => global_priority_query: true, mandatory 1.4;
+        shaderSubgroupRotate => shader_subgroup_rotate: true, mandatory 1.4;
+        shaderSubgroupRotateClustered => shader_subgroup_rotate_clustered: true, mandatory 1.4;
+        shaderFloatControls2 => shader_float_controls2: true, mandatory 1.4;
+        shaderExpectAssume => shader_expect_assume: true, mandatory 1.4;
+        rectangularLines => rectangular_lines: true;
+        bresenhamLines => bresenham_lines: true, mandatory 1.4;
+        smoothLines => smooth_lines: true;
+        stippledRectangularLines => stippled_rectangular_lines: true;
+        stippledBresenhamLines => stippled_bresenham_lines: true;
+        stippledSmoothLines => stippled_smooth_lines: true;
+        vertexAttributeInstanceRateDivisor => vertex_attribute_instance_rate_divisor: true, mandatory 1.4;
+        vertexAttributeInstanceRateZeroDivisor => vertex_attribute_instance_rate_zero_divisor: true;
+        indexTypeUint8 => index_type_uint8: true, mandatory 1.4;
+        dynamicRenderingLocalRead => dynamic_rendering_local_read: true, mandatory 1.4;
+        maintenance5 => maintenance5: true, mandatory 1.4;
+        maintenance6 => maintenance6: true, mandatory 1.4;
+        pipelineProtectedAccess => pipeline_protected_access: true;
+        pipelineRobustness => pipeline_robustness: true, mandatory 1.4;
+        hostImageCopy => host_image_copy: true;
+        pushDescriptor => push_descriptor: true, mandatory 1.4;
     }
     structure vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD:
         c"VK_AMD_shader_early_and_late_fragment_tests" {
@@ -252,28 +275,12 @@ features! {
             extended_dynamic_state3_representative_fragment_test_enable: false;
         extendedDynamicState3ShadingRateImageEnable => extended_dynamic_state3_shading_rate_image_enable: false;
     }
-    structure vk::PhysicalDeviceGlobalPriorityQueryFeaturesKHR:
-        c"VK_EXT_global_priority_query" | c"VK_KHR_global_priority" {
-        globalPriorityQuery => global_priority_query: true;
-    }
     structure vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT: c"VK_EXT_graphics_pipeline_library" {
         graphicsPipelineLibrary => graphics_pipeline_library: true;
     }
     structure vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT: c"VK_EXT_image_2d_view_of_3d" {
         image2DViewOf3D => image2_d_view_of3_d: true;
         sampler2DViewOf3D => sampler2_d_view_of3_d: true;
-    }
-    structure vk::PhysicalDeviceIndexTypeUint8FeaturesKHR: c"VK_EXT_index_type_uint8" | c"VK_KHR_index_type_uint8" {
-        indexTypeUint8 => index_type_uint8: true;
-    }
-    structure vk::PhysicalDeviceLineRasterizationFeaturesKHR:
-        c"VK_EXT_line_rasterization" | c"VK_KHR_line_rasterization" {
-        rectangularLines => rectangular_lines: true;
-        bresenhamLines => bresenham_lines: true;
-        smoothLines => smooth_lines: true;
-        stippledRectangularLines => stippled_rectangular_lines: true;
-        stippledBresenhamLines => stippled_bresenham_lines: true;
-        stippledSmoothLines => stippled_smooth_lines: true;
     }
     structure vk::PhysicalDeviceMemoryPriorityFeaturesEXT: c"VK_EXT_memory_priority" {
         memoryPriority => memory_priority: true;
@@ -290,12 +297,6 @@ features! {
     }
     structure vk::PhysicalDevicePageableDeviceLocalMemoryFeaturesEXT: c"VK_EXT_pageable_device_local_memory" {
         pageableDeviceLocalMemory => pageable_device_local_memory: true;
-    }
-    structure vk::PhysicalDevicePipelineProtectedAccessFeaturesEXT: c"VK_EXT_pipeline_protected_access" {
-        pipelineProtectedAccess => pipeline_protected_access: true;
-    }
-    structure vk::PhysicalDevicePipelineRobustnessFeaturesEXT: c"VK_EXT_pipeline_robustness" {
-        pipelineRobustness => pipeline_robustness: true;
     }
     structure crate::registry::newer::PhysicalDevicePrimitiveRestartIndexFeaturesEXT:
         c"VK_EXT_primitive_restart_index" {
@@ -364,11 +365,6 @@ features! {
         transformFeedback => transform_feedback: true;
         geometryStreams => geometry_streams: true;
     }
-    structure vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR:
-        c"VK_EXT_vertex_attribute_divisor" | c"VK_KHR_vertex_attribute_divisor" {
-        vertexAttributeInstanceRateDivisor => vertex_attribute_instance_rate_divisor: true;
-        vertexAttributeInstanceRateZeroDivisor => vertex_attribute_instance_rate_zero_divisor: true;
-    }
     structure vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT: c"VK_EXT_vertex_input_dynamic_state" {
         vertexInputDynamicState => vertex_input_dynamic_state: true;
     }
@@ -412,15 +408,6 @@ features! {
         attributeDecoding => attribute_decoding: true;
         gaussian2DCutOff => gaussian_2d_cut_off: true;
     }
-    structure vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR: c"VK_KHR_dynamic_rendering_local_read" {
-        dynamicRenderingLocalRead => dynamic_rendering_local_read: true;
-    }
-    structure vk::PhysicalDeviceMaintenance5FeaturesKHR: c"VK_KHR_maintenance5" {
-        maintenance5 => maintenance5: true;
-    }
-    structure vk::PhysicalDeviceMaintenance6FeaturesKHR: c"VK_KHR_maintenance6" {
-        maintenance6 => maintenance6: true;
-    }
     structure vk::PhysicalDevicePerformanceQueryFeaturesKHR: c"VK_KHR_performance_query" {
         performanceCounterQueryPools => performance_counter_query_pools: true;
         performanceCounterMultipleQueryPools => performance_counter_multiple_query_pools: false;
@@ -428,12 +415,6 @@ features! {
     structure vk::PhysicalDeviceShaderClockFeaturesKHR: c"VK_KHR_shader_clock" {
         shaderSubgroupClock => shader_subgroup_clock: true;
         shaderDeviceClock => shader_device_clock: true;
-    }
-    structure vk::PhysicalDeviceShaderExpectAssumeFeaturesKHR: c"VK_KHR_shader_expect_assume" {
-        shaderExpectAssume => shader_expect_assume: true;
-    }
-    structure vk::PhysicalDeviceShaderFloatControls2FeaturesKHR: c"VK_KHR_shader_float_controls2" {
-        shaderFloatControls2 => shader_float_controls2: true;
     }
     structure vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR: c"VK_KHR_shader_maximal_reconvergence" {
         shaderMaximalReconvergence => shader_maximal_reconvergence: true;
@@ -444,10 +425,6 @@ features! {
     structure crate::registry::newer::PhysicalDeviceShaderRelaxedExtendedInstructionFeaturesKHR:
         c"VK_KHR_shader_relaxed_extended_instruction" {
         shaderRelaxedExtendedInstruction => shader_relaxed_extended_instruction: true;
-    }
-    structure vk::PhysicalDeviceShaderSubgroupRotateFeaturesKHR: c"VK_KHR_shader_subgroup_rotate" {
-        shaderSubgroupRotate => shader_subgroup_rotate: true;
-        shaderSubgroupRotateClustered => shader_subgroup_rotate_clustered: true;
     }
     structure crate::registry::newer::PhysicalDeviceUnifiedImageLayoutsFeaturesKHR: c"VK_KHR_unified_image_layouts" {
         unifiedImageLayouts => unified_image_layouts: true;
@@ -513,4 +490,24 @@ features! {
     }
     repeated vk::PhysicalDeviceShaderIntegerDotProductFeatures { shader_integer_dot_product }
     repeated vk::PhysicalDeviceDynamicRenderingFeatures { dynamic_rendering }
+    repeated vk::PhysicalDeviceGlobalPriorityQueryFeaturesKHR { global_priority_query }
+    repeated vk::PhysicalDeviceIndexTypeUint8FeaturesKHR { index_type_uint8 }
+    repeated vk::PhysicalDeviceMaintenance5FeaturesKHR { maintenance5 }
+    repeated vk::PhysicalDeviceMaintenance6FeaturesKHR { maintenance6 }
+    repeated vk::PhysicalDeviceHostImageCopyFeaturesEXT { host_image_copy }
+    repeated vk::PhysicalDeviceShaderSubgroupRotateFeaturesKHR {
+        shader_subgroup_rotate, shader_subgroup_rotate_clustered
+    }
+    repeated vk::PhysicalDeviceShaderFloatControls2FeaturesKHR { shader_float_controls2 }
+    repeated vk::PhysicalDeviceShaderExpectAssumeFeaturesKHR { shader_expect_assume }
+    repeated vk::PhysicalDevicePipelineProtectedAccessFeaturesEXT { pipeline_protected_access }
+    repeated vk::PhysicalDevicePipelineRobustnessFeaturesEXT { pipeline_robustness }
+    repeated vk::PhysicalDeviceLineRasterizationFeaturesKHR {
+        rectangular_lines, bresenham_lines, smooth_lines, stippled_rectangular_lines, stippled_bresenham_lines,
+        stippled_smooth_lines
+    }
+    repeated vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR {
+        vertex_attribute_instance_rate_divisor, vertex_attribute_instance_rate_zero_divisor
+    }
+    repeated vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR { dynamic_rendering_local_read }
 }

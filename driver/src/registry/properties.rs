@@ -282,6 +282,31 @@ properties! {
         uniformTexelBufferOffsetSingleTexelAlignment => uniform_texel_buffer_offset_single_texel_alignment: bool;
         maxBufferSize => max_buffer_size: vk::DeviceSize;
     }
+    structure crate::registry::newer::PhysicalDeviceVulkan14Properties {
+        lineSubPixelPrecisionBits => line_sub_pixel_precision_bits: u32;
+        maxVertexAttribDivisor => max_vertex_attrib_divisor: u32;
+        supportsNonZeroFirstInstance => supports_non_zero_first_instance: bool;
+        maxPushDescriptors => max_push_descriptors: u32;
+        dynamicRenderingLocalReadDepthStencilAttachments =>
+            dynamic_rendering_local_read_depth_stencil_attachments: bool;
+        dynamicRenderingLocalReadMultisampledAttachments => dynamic_rendering_local_read_multisampled_attachments: bool;
+        earlyFragmentMultisampleCoverageAfterSampleCounting =>
+            early_fragment_multisample_coverage_after_sample_counting: bool;
+        earlyFragmentSampleMaskTestBeforeSampleCounting => early_fragment_sample_mask_test_before_sample_counting: bool;
+        depthStencilSwizzleOneSupport => depth_stencil_swizzle_one_support: bool;
+        polygonModePointSize => polygon_mode_point_size: bool;
+        nonStrictSinglePixelWideLinesUseParallelogram => non_strict_single_pixel_wide_lines_use_parallelogram: bool;
+        nonStrictWideLinesUseParallelogram => non_strict_wide_lines_use_parallelogram: bool;
+        blockTexelViewCompatibleMultipleLayers => block_texel_view_compatible_multiple_layers: bool;
+        maxCombinedImageSamplerDescriptorCount => max_combined_image_sampler_descriptor_count: u32;
+        fragmentShadingRateClampCombinerInputs => fragment_shading_rate_clamp_combiner_inputs: bool;
+        defaultRobustnessStorageBuffers => default_robustness_storage_buffers: vk::PipelineRobustnessBufferBehaviorEXT;
+        defaultRobustnessUniformBuffers => default_robustness_uniform_buffers: vk::PipelineRobustnessBufferBehaviorEXT;
+        defaultRobustnessVertexInputs => default_robustness_vertex_inputs: vk::PipelineRobustnessBufferBehaviorEXT;
+        defaultRobustnessImages => default_robustness_images: vk::PipelineRobustnessImageBehaviorEXT;
+        optimalTilingLayoutUUID => optimal_tiling_layout_uuid: [u8; vk::UUID_SIZE];
+        identicalMemoryTypeRequirements => identical_memory_type_requirements: bool;
+    }
     structure vk::PhysicalDeviceCustomBorderColorPropertiesEXT {
         maxCustomBorderColorSamplers => max_custom_border_color_samplers: u32;
     }
@@ -296,17 +321,8 @@ properties! {
         graphicsPipelineLibraryIndependentInterpolationDecoration =>
             graphics_pipeline_library_independent_interpolation_decoration: bool;
     }
-    structure vk::PhysicalDeviceLineRasterizationPropertiesKHR {
-        lineSubPixelPrecisionBits => line_sub_pixel_precision_bits: u32;
-    }
     structure vk::PhysicalDeviceMultiDrawPropertiesEXT {
         maxMultiDrawCount => max_multi_draw_count: u32;
-    }
-    structure vk::PhysicalDevicePipelineRobustnessPropertiesEXT {
-        defaultRobustnessStorageBuffers => default_robustness_storage_buffers: vk::PipelineRobustnessBufferBehaviorEXT;
-        defaultRobustnessUniformBuffers => default_robustness_uniform_buffers: vk::PipelineRobustnessBufferBehaviorEXT;
-        defaultRobustnessVertexInputs => default_robustness_vertex_inputs: vk::PipelineRobustnessBufferBehaviorEXT;
-        defaultRobustnessImages => default_robustness_images: vk::PipelineRobustnessImageBehaviorEXT;
     }
     structure vk::PhysicalDeviceProvokingVertexPropertiesEXT {
         provokingVertexModePerPipeline => provoking_vertex_mode_per_pipeline: bool;
@@ -329,9 +345,6 @@ properties! {
         transformFeedbackRasterizationStreamSelect => transform_feedback_rasterization_stream_select: bool;
         transformFeedbackDraw => transform_feedback_draw: bool;
     }
-    structure vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT {
-        maxVertexAttribDivisor => max_vertex_attrib_divisor: u32;
-    }
     structure gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
         tileSize => tile_size: vk::Extent2D;
         maxSphericalHarmonicsDegree => max_spherical_harmonics_degree: u32;
@@ -342,28 +355,8 @@ properties! {
     structure gaurast::vk::PhysicalDeviceGaussianPrecisionPropertiesGAURAST {
         precisionClass => precision_class: gaurast::vk::GaussianPrecisionClassGAURAST;
     }
-    structure vk::PhysicalDeviceMaintenance5PropertiesKHR {
-        earlyFragmentMultisampleCoverageAfterSampleCounting =>
-            early_fragment_multisample_coverage_after_sample_counting: bool;
-        earlyFragmentSampleMaskTestBeforeSampleCounting => early_fragment_sample_mask_test_before_sample_counting: bool;
-        depthStencilSwizzleOneSupport => depth_stencil_swizzle_one_support: bool;
-        polygonModePointSize => polygon_mode_point_size: bool;
-        nonStrictSinglePixelWideLinesUseParallelogram => non_strict_single_pixel_wide_lines_use_parallelogram: bool;
-        nonStrictWideLinesUseParallelogram => non_strict_wide_lines_use_parallelogram: bool;
-    }
-    structure vk::PhysicalDeviceMaintenance6PropertiesKHR {
-        blockTexelViewCompatibleMultipleLayers => block_texel_view_compatible_multiple_layers: bool;
-        maxCombinedImageSamplerDescriptorCount => max_combined_image_sampler_descriptor_count: u32;
-        fragmentShadingRateClampCombinerInputs => fragment_shading_rate_clamp_combiner_inputs: bool;
-    }
     structure vk::PhysicalDevicePerformanceQueryPropertiesKHR {
         allowCommandBufferQueryCopies => allow_command_buffer_query_copies: bool;
-    }
-    structure vk::PhysicalDevicePushDescriptorPropertiesKHR {
-        maxPushDescriptors => max_push_descriptors: u32;
-    }
-    structure vk::PhysicalDeviceVertexAttributeDivisorPropertiesKHR {
-        supportsNonZeroFirstInstance => supports_non_zero_first_instance: bool;
     }
     repeated vk::PhysicalDeviceProtectedMemoryProperties { protected_no_fault }
     repeated vk::PhysicalDeviceIDProperties {
@@ -448,5 +441,27 @@ properties! {
         storage_texel_buffer_offset_alignment_bytes, storage_texel_buffer_offset_single_texel_alignment,
         uniform_texel_buffer_offset_alignment_bytes, uniform_texel_buffer_offset_single_texel_alignment
     }
-    repeated vk::PhysicalDeviceVertexAttributeDivisorPropertiesKHR { max_vertex_attrib_divisor }
+    repeated vk::PhysicalDeviceMaintenance5PropertiesKHR {
+        early_fragment_multisample_coverage_after_sample_counting,
+        early_fragment_sample_mask_test_before_sample_counting, depth_stencil_swizzle_one_support,
+        polygon_mode_point_size, non_strict_single_pixel_wide_lines_use_parallelogram,
+        non_strict_wide_lines_use_parallelogram
+    }
+    repeated vk::PhysicalDeviceMaintenance6PropertiesKHR {
+        block_texel_view_compatible_multiple_layers, max_combined_image_sampler_descriptor_count,
+        fragment_shading_rate_clamp_combiner_inputs
+    }
+    repeated vk::PhysicalDeviceHostImageCopyPropertiesEXT {
+        optimal_tiling_layout_uuid, identical_memory_type_requirements
+    }
+    repeated vk::PhysicalDevicePushDescriptorPropertiesKHR { max_push_descriptors }
+    repeated vk::PhysicalDevicePipelineRobustnessPropertiesEXT {
+        default_robustness_storage_buffers, default_robustness_uniform_buffers, default_robustness_vertex_inputs,
+        default_robustness_images
+    }
+    repeated vk::PhysicalDeviceLineRasterizationPropertiesKHR { line_sub_pixel_precision_bits }
+    repeated vk::PhysicalDeviceVertexAttributeDivisorPropertiesKHR {
+        max_vertex_attrib_divisor, supports_non_zero_first_instance
+    }
+    repeated vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT { max_vertex_attrib_divisor }
 }

@@ -11,7 +11,7 @@ use crate::physical_device::external;
 use crate::physical_device::formats::{self, ImageQuery, YcbcrFormat};
 use ash::vk;
 use simdevice::format::Aspect;
-use simdevice::image::{ImageDesc, ImageKind};
+use simdevice::image::{ImageDesc, ImageKind, SubresourceLayout};
 use simdevice::texture::{Chroma, Swizzle};
 use simdevice::{Allocation, image};
 use std::sync::{Arc, OnceLock};
@@ -206,6 +206,11 @@ impl Image {
                 .map_err(|_| Error::usage("VUID-vkBindImageMemory-image-07460", "the image is bound already"))?;
         }
         Ok(())
+    }
+
+    /// Marks the memory of the planes that are bound as changed.
+    pub(crate) fn mark_changed(&self) {
+        self.planes.iter().filter_map(|plane| plane.bound.get()).for_each(|image| image.memory.bump_generation());
     }
 
     /// The image, or its first plane, in its memory.
@@ -510,32 +515,51 @@ pub(crate) fn get_image_subresource_layout(
     image: &Image,
     subresource: &vk::ImageSubresource,
 ) -> Result<vk::SubresourceLayout, Error> {
-    subresource_layout(image, subresource)
+    find_subresource(image, subresource).map(|(begin, found)| vulkan_layout(begin, &found))
 }
 
 #[doc(alias = "vkGetImageSubresourceLayout2KHR")]
 pub(crate) fn get_image_subresource_layout2(
     image: &Image,
     subresource: &vk::ImageSubresource2KHR<'_>,
-    layout: &mut vk::SubresourceLayout2KHR<'_>,
+    layout: OutputChain<'_, vk::SubresourceLayout2KHR<'_>>,
 ) -> Result<(), Error> {
-    layout.subresource_layout = subresource_layout(image, &subresource.image_subresource)?;
-    Ok(())
+    fill_layout(image, &subresource.image_subresource, layout)
 }
 
 #[doc(alias = "vkGetDeviceImageSubresourceLayoutKHR")]
 pub(crate) fn get_device_image_subresource_layout(
     create_info: &vk::ImageCreateInfo<'_>,
     subresource: &vk::ImageSubresource2KHR<'_>,
-    layout: &mut vk::SubresourceLayout2KHR<'_>,
+    layout: OutputChain<'_, vk::SubresourceLayout2KHR<'_>>,
 ) -> Result<(), Error> {
     let image = new_image(create_info, None, None)?;
-    layout.subresource_layout = subresource_layout(&image, &subresource.image_subresource)?;
+    fill_layout(&image, &subresource.image_subresource, layout)
+}
+
+/// Writes the layout of a subresource, and its size in the host's memory where the chain asks for it: there its texels
+/// are tightly packed.
+fn fill_layout(
+    image: &Image,
+    subresource: &vk::ImageSubresource,
+    mut layout: OutputChain<'_, vk::SubresourceLayout2KHR<'_>>,
+) -> Result<(), Error> {
+    let (begin, found) = find_subresource(image, subresource)?;
+    layout.subresource_layout = vulkan_layout(begin, &found);
+    let texels = found.extent.iter().map(|&side| vk::DeviceSize::from(side)).product::<vk::DeviceSize>();
+    layout.for_each_chained(|mut structure| {
+        if let Some(out) = structure.cast::<vk::SubresourceHostMemcpySizeEXT<'_>>() {
+            out.size = texels * found.format.texel_size() as vk::DeviceSize;
+        }
+    });
     Ok(())
 }
 
-/// The layout of a subresource in an image's memory.
-fn subresource_layout(image: &Image, subresource: &vk::ImageSubresource) -> Result<vk::SubresourceLayout, Error> {
+/// A subresource in an image's memory, from a byte on.
+fn find_subresource(
+    image: &Image,
+    subresource: &vk::ImageSubresource,
+) -> Result<(vk::DeviceSize, SubresourceLayout), Error> {
     let missing = || {
         Error::usage(
             "VUID-vkGetImageSubresourceLayout-mipLevel-01716",
@@ -549,13 +573,18 @@ fn subresource_layout(image: &Image, subresource: &vk::ImageSubresource) -> Resu
     let found = found.ok_or_else(missing)?;
     // The layout of a plane that is bound by itself counts from there.
     let begin = if image.is_disjoint { 0 } else { plane.offset };
-    Ok(vk::SubresourceLayout {
+    Ok((begin, found))
+}
+
+/// Vulkan's layout of a subresource.
+fn vulkan_layout(begin: vk::DeviceSize, found: &SubresourceLayout) -> vk::SubresourceLayout {
+    vk::SubresourceLayout {
         offset: begin + found.offset,
         size: found.size,
         row_pitch: found.row_pitch,
         array_pitch: found.array_pitch,
         depth_pitch: found.depth_pitch,
-    })
+    }
 }
 
 #[doc(alias = "vkBindImageMemory")]
