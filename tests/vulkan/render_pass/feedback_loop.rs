@@ -5,8 +5,8 @@ use gaurast_runner::Case;
 use gaurast_testkit::shader::GLSLANG;
 use gaurast_testkit::stage_program::{drivers, options};
 use gaurast_testkit::{
-    Attachments, Bindings, Driver, Formats, Gpu, Image, ImageOptions, Opening, Pass, Pipeline, PipelineOptions,
-    Resource, Sampler,
+    Attachments, Bindings, Commands, Driver, Formats, Gpu, Image, ImageOptions, Opening, Pass, Pipeline,
+    PipelineOptions, Resource, Sampler,
 };
 
 /// An image that draws write and read.
@@ -54,6 +54,26 @@ fn device(case: &Case) -> Gpu {
     Gpu::open_with(&opening, &mut features).expect("a device")
 }
 
+/// Lets the next draw read what the pass has written to its pixels.
+fn feedback_barrier(commands: &Commands) {
+    let (device, raw) = commands.raw();
+    let written = vk::AccessFlags::COLOR_ATTACHMENT_WRITE;
+    let barrier =
+        vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(vk::AccessFlags::SHADER_READ | written);
+    // SAFETY: see the crate.
+    unsafe {
+        device.cmd_pipeline_barrier(
+            raw,
+            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+            vk::PipelineStageFlags::FRAGMENT_SHADER | vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+            vk::DependencyFlags::BY_REGION | vk::DependencyFlags::FEEDBACK_LOOP_EXT,
+            &[barrier],
+            &[],
+            &[],
+        );
+    }
+}
+
 /// Each draw doubles what the draws before it have left, and adds its pixel's column; barriers are between the draws.
 #[gaurast_runner::test(needs = [GLSLANG], each = drivers())]
 fn a_draw_reads_what_it_replaces(case: &Case) {
@@ -93,23 +113,7 @@ fn a_draw_reads_what_it_replaces(case: &Case) {
             commands.bind(&pipeline);
             commands.bind_set(&bindings, &[]);
             for _ in 0..DRAWS {
-                let (device, raw) = commands.raw();
-                let written = vk::AccessFlags::COLOR_ATTACHMENT_WRITE;
-                let barrier = vk::MemoryBarrier::default()
-                    .src_access_mask(written)
-                    .dst_access_mask(vk::AccessFlags::SHADER_READ | written);
-                // SAFETY: see the crate.
-                unsafe {
-                    device.cmd_pipeline_barrier(
-                        raw,
-                        vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
-                        vk::PipelineStageFlags::FRAGMENT_SHADER | vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
-                        vk::DependencyFlags::BY_REGION | vk::DependencyFlags::FEEDBACK_LOOP_EXT,
-                        &[barrier],
-                        &[],
-                        &[],
-                    );
-                }
+                feedback_barrier(commands);
                 commands.draw(0..3);
             }
         });
@@ -165,6 +169,7 @@ fn feedback_may_be_dynamic() {
             unsafe {
                 (dynamic.fp().cmd_set_attachment_feedback_loop_enable_ext)(raw, vk::ImageAspectFlags::COLOR);
             }
+            feedback_barrier(commands);
             commands.draw(0..3);
         });
     });

@@ -135,7 +135,7 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     for topology in TOPOLOGIES {
         for (index_size, restart, own) in
-            [(1, 0xFF, None), (2, 0xFFFF, None), (4, u32::MAX, None), (1, 11, Some(11)), (4, 5, Some(5))]
+            [(1, 0xFF, None), (2, 0xFFFF, None), (4, u32::MAX, None), (1, 11, Some(11)), (4, 9, Some(9))]
         {
             for restarts in [false, true] {
                 let mut draw = draw(&device, topology, &positions(100));
