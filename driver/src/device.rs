@@ -361,15 +361,21 @@ pub(crate) unsafe fn get_private_data(
 mod tests {
     use super::*;
     use crate::registry::features::{MANDATORY, SUPPORTED};
+    use crate::registry::newer;
     use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
     use std::collections::HashMap;
 
-    /// Features that Vulkan 1.3 requires and that are not supported; `driver/support.toml` has the reasons.
+    /// Features that Vulkan requires and that are not supported; `driver/support.toml` has the reasons.
     const REQUIRED_BUT_MISSING: &[&str] = &[];
 
     /// The number of supported features of a structure.
-    fn count<T: vk::TaggedStructure + Default>() -> usize {
-        let mut structure = T::default();
+    fn count<T: vk::TaggedStructure>() -> usize {
+        // SAFETY: such a structure begins with its type and a pointer, and all else are truth values.
+        let mut structure = unsafe {
+            let mut structure = std::mem::MaybeUninit::<T>::zeroed();
+            (*structure.as_mut_ptr().cast::<vk::BaseOutStructure<'_>>()).s_type = T::STRUCTURE_TYPE;
+            structure.assume_init()
+        };
         let mut head = vk::PhysicalDeviceFeatures2 { p_next: (&raw mut structure).cast(), ..Default::default() };
         let mut features = Features::NONE;
         // SAFETY: the structure is alone in its chain.
@@ -394,17 +400,16 @@ mod tests {
             count::<vk::PhysicalDeviceVulkan11Features<'_>>(),
             count::<vk::PhysicalDeviceVulkan12Features<'_>>(),
             count::<vk::PhysicalDeviceVulkan13Features<'_>>(),
+            count::<newer::PhysicalDeviceVulkan14Features>(),
             count::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>(),
             count::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>(),
-            count::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(),
-            count::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(),
             count::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(),
@@ -422,20 +427,31 @@ mod tests {
             count::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(),
-            count::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(),
             count::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceMultisampledRenderToSingleSampledFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceYcbcr2Plane444FormatsFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceAttachmentFeedbackLoopDynamicStateFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceDepthBiasControlFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceDynamicRenderingUnusedAttachmentsFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceMemoryPriorityFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDevicePageableDeviceLocalMemoryFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceShaderQuadControlFeaturesKHR<'_>>(),
+            count::<newer::PhysicalDevicePrimitiveRestartIndexFeaturesEXT>(),
+            count::<newer::PhysicalDeviceShaderReplicatedCompositesFeaturesEXT>(),
+            count::<newer::PhysicalDeviceZeroInitializeDeviceMemoryFeaturesEXT>(),
+            count::<newer::PhysicalDeviceShaderRelaxedExtendedInstructionFeaturesKHR>(),
+            count::<newer::PhysicalDeviceUnifiedImageLayoutsFeaturesKHR>(),
             count::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(),
         ];
         assert_eq!(
             counts,
             [
-                44, 10, 43, 14, 1, 1, 1, 2, 3, 1, 1, 3, 1, 2, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1, 16, 6,
-                1, 2, 1, 3, 1, 1, 30
+                44, 10, 43, 14, 21, 1, 1, 1, 2, 3, 1, 3, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1, 16, 1,
+                2, 1, 3, 1, 1, 1, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 30
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

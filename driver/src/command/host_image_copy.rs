@@ -7,7 +7,6 @@ use crate::resource::image::Image;
 use ash::vk;
 use simdevice::image::{self, SubresourceLayout};
 use simdevice::{host, transfer};
-use std::ffi::c_void;
 use std::mem::MaybeUninit;
 
 /// The rules on the image of `vkCopyMemoryToImage`.
