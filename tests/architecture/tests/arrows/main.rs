@@ -1,6 +1,7 @@
 //! Checks that the modules of each crate of the workspace have no import cycles: there is no cycle between the children
 //! of any module. Packages depend on each other as the layers say, and bindings are named after their types. What packets add
-//! to the device is allocated by functions that can fail. `cargo package` takes the packages that are published.
+//! to the device is allocated by functions that can fail. `cargo package` takes the packages that are published. The
+//! repository has the project's own files alone.
 //!
 //! All paths in the sources count (imports, expressions, types, macro arguments), except those of tests within a crate.
 //! An `impl` outside the module of its type counts as an arrow from the type's module to that of the `impl`, since
@@ -14,6 +15,7 @@ mod harness;
 mod layers;
 mod packages;
 mod refusals;
+mod repository;
 mod source;
 mod workspace;
 
