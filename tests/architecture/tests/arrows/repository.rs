@@ -8,7 +8,7 @@ use gaurast_runner::Need;
 use crate::workspace;
 
 /// What the repository has at the top level: the project's folders, and what every project has.
-const TOP_LEVEL: [&str; 25] = [
+const TOP_LEVEL: [&str; 26] = [
     ".ci",
     ".dockerignore",
     ".editorconfig",
@@ -34,10 +34,8 @@ const TOP_LEVEL: [&str; 25] = [
     "rustfmt.toml",
     "samples",
     "simdevice",
+    "tests",
 ];
-
-/// The folder of tests, beside [`TOP_LEVEL`].
-const TESTS: &str = "tests";
 
 /// The size of the largest file that the repository may have, in bytes.
 const MAX_SIZE: u64 = 1 << 20;
@@ -55,7 +53,7 @@ fn files() -> Vec<String> {
 /// The entries of the top level that paths have and that are not the project's.
 fn strangers<'a>(files: &[&'a str]) -> BTreeSet<&'a str> {
     let entries = files.iter().filter_map(|path| path.split('/').next());
-    entries.filter(|entry| *entry != TESTS && !TOP_LEVEL.contains(entry)).collect()
+    entries.filter(|entry| !TOP_LEVEL.contains(entry)).collect()
 }
 
 #[gaurast_runner::test(needs = [Need::Program("git")])]
