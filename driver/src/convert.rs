@@ -461,14 +461,14 @@ pub(crate) fn rect(rect: vk::Rect2D) -> Rect {
     Rect { x: rect.offset.x, y: rect.offset.y, width: rect.extent.width, height: rect.extent.height }
 }
 
-/// A colour clear value for an image of that format.
+/// A colour clear value for an image of that format. Scaled formats are cleared to integers, as Khronos' tests expect.
 pub(crate) fn clear_color(format: Format, value: vk::ClearColorValue) -> ClearValue {
     // SAFETY: every member of the union is sixteen bytes of plain data, and Vulkan has the application write the one
     // that the format calls for.
     unsafe {
         match format.numeric() {
-            Numeric::Sint => ClearValue::Int(value.int32),
-            Numeric::Uint => ClearValue::Uint(value.uint32),
+            Numeric::Sint | Numeric::Sscaled => ClearValue::Int(value.int32),
+            Numeric::Uint | Numeric::Uscaled => ClearValue::Uint(value.uint32),
             _ => ClearValue::Float(value.float32),
         }
     }

@@ -12,15 +12,35 @@ fn main() -> std::process::ExitCode {
 /// The ids of Vulkan's specification, as Debian's package of the headers has them.
 const VALID_USAGE: &str = "/usr/share/vulkan/registry/validusage.json";
 
-/// Ids that the package's version, Vulkan 1.3.239, lacks, and that 1.3.281 has.
-const NEWER: [&str; 11] = [
+/// Ids that the package's version, Vulkan 1.3.239, lacks, and that Vulkan 1.4 has.
+const NEWER: [&str; 31] = [
     "VUID-RuntimeSpirv-OpEntryPoint-08743",
     "VUID-VkComputePipelineCreateInfo-layout-07988",
+    "VUID-VkCopyImageToImageInfo-dstImage-07966",
+    "VUID-VkCopyImageToImageInfo-dstSubresource-07967",
+    "VUID-VkCopyImageToImageInfo-dstSubresource-07968",
+    "VUID-VkCopyImageToImageInfo-dstSubresource-09105",
+    "VUID-VkCopyImageToImageInfo-srcImage-07966",
+    "VUID-VkCopyImageToImageInfo-srcSubresource-07967",
+    "VUID-VkCopyImageToImageInfo-srcSubresource-07968",
+    "VUID-VkCopyImageToImageInfo-srcSubresource-09105",
+    "VUID-VkCopyImageToMemoryInfo-imageSubresource-07967",
+    "VUID-VkCopyImageToMemoryInfo-imageSubresource-07968",
+    "VUID-VkCopyImageToMemoryInfo-imageSubresource-07971",
+    "VUID-VkCopyImageToMemoryInfo-imageSubresource-09105",
+    "VUID-VkCopyImageToMemoryInfo-srcImage-07966",
+    "VUID-VkCopyMemoryToImageInfo-dstImage-07966",
+    "VUID-VkCopyMemoryToImageInfo-imageSubresource-07967",
+    "VUID-VkCopyMemoryToImageInfo-imageSubresource-07968",
+    "VUID-VkCopyMemoryToImageInfo-imageSubresource-07971",
+    "VUID-VkCopyMemoryToImageInfo-imageSubresource-09105",
     "VUID-VkDepthBiasRepresentationInfoEXT-depthBiasRepresentation-parameter",
     "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
     "VUID-VkGraphicsPipelineCreateInfo-Input-08733",
     "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
+    "VUID-VkImageToMemoryCopy-aspectMask-09103",
     "VUID-VkMemoryAllocateInfo-allocationSize-07899",
+    "VUID-VkMemoryToImageCopy-aspectMask-09103",
     "VUID-VkPipelineShaderStageCreateInfo-stage-08771",
     "VUID-VkShaderModuleCreateInfo-pCode-08738",
     "VUID-VkShaderModuleCreateInfo-pCode-08740",

@@ -215,7 +215,7 @@ impl Globals {
 
     fn constant(&mut self, module: &Module, specialization: &Specialization, instruction: &Instruction) -> Result<()> {
         let (id, ty) = (instruction.result()?, instruction.ty()?);
-        if instruction.opcode == Op::Undef && self.types.is_opaque(ty) {
+        if instruction.opcode == Op::Undef && (self.types.is_opaque(ty) || self.types.is_runtime_array(ty)) {
             self.undefined.insert(id, ty);
             return Ok(());
         }

@@ -315,6 +315,11 @@ impl Types {
         }
     }
 
+    /// Reports whether a type is an array without a length, of which there are no values.
+    pub fn is_runtime_array(&self, id: u32) -> bool {
+        matches!(self.get(id), Ok(Type::RuntimeArray { .. }))
+    }
+
     /// The scalars of a value, in order.
     pub fn flatten(&self, id: u32) -> Result<Vec<Scalar>> {
         let mut scalars = Vec::with_capacity(self.scalars(id)? as usize);

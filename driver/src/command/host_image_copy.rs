@@ -82,8 +82,8 @@ impl Region<'_> {
             Error::usage(outside, format!("the image does not have all of {extent:?} from {offset:?} on"))
         };
         let (plane, layers) = layers(self.image, &self.subresource, rules, single_aspect)?;
-        let image = self.image.bound_plane(plane, rules.memory)?;
-        let [across, down] = image.desc.format.block_extent();
+        let image = &*self.image.blocks(plane, rules.memory)?;
+        let [across, down] = self.image.block_extent();
         let [width, height, depth] = block_extent(self.image, self.extent);
         let or_tight = |length: u32, tight: u32| u64::from(if length == 0 { tight } else { length });
         let row_length = or_tight(self.row_length.div_ceil(across), width);

@@ -357,7 +357,7 @@ fn copy_buffer_image(
     image_rules: &ImageRules,
 ) -> Result<Vec<CopyBufferImage>, Error> {
     let buffer = buffer.whole(buffer_rules)?;
-    let [across, down] = image.desc.format.block_extent();
+    let [across, down] = image.block_extent();
     let mut copies = ByPlanes::default();
     for region in regions {
         let (plane, subresource) =
@@ -373,7 +373,7 @@ fn copy_buffer_image(
         copies.add(plane, converted);
     }
     let copy = |(plane, regions)| {
-        let image = Arc::clone(image.bound_plane(plane, image_rules.memory)?);
+        let image = image.blocks(plane, image_rules.memory)?;
         Ok(CopyBufferImage { buffer: buffer.clone(), image, regions })
     };
     copies.0.into_iter().map(copy).collect()
@@ -432,8 +432,8 @@ pub(super) fn copy_image(
     }
     let copy = |([source, target], regions): ([usize; 2], _)| {
         Ok(CopyImage {
-            source: Arc::clone(source_image.bound_plane(source, source_rules.memory)?),
-            target: Arc::clone(target_image.bound_plane(target, target_rules.memory)?),
+            source: source_image.blocks(source, source_rules.memory)?,
+            target: target_image.blocks(target, target_rules.memory)?,
             regions,
         })
     };
@@ -700,12 +700,12 @@ fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {
 /// Converts an offset from texels to the blocks in which an image is stored.
 pub(super) fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
     // Valid usage requires multiples of a block's extent.
-    let [across, down] = image.desc.format.block_extent().map(u32::cast_signed);
+    let [across, down] = image.block_extent().map(u32::cast_signed);
     [offset.x / across, offset.y / down, offset.z]
 }
 
 /// Converts an extent from texels to the blocks in which an image is stored.
 pub(super) fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
-    let [across, down] = image.desc.format.block_extent();
+    let [across, down] = image.block_extent();
     [extent.width.div_ceil(across), extent.height.div_ceil(down), extent.depth]
 }

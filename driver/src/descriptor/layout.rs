@@ -32,6 +32,8 @@ pub(crate) struct BindingInfo {
 /// A binding in its set.
 #[derive(Clone, Debug)]
 pub(crate) struct LayoutBinding {
+    /// Its number.
+    pub(crate) number: u32,
     /// The kind of its descriptors.
     pub(crate) kind: vk::DescriptorType,
     /// The number of its descriptors; the most, if the count is variable.
@@ -52,7 +54,8 @@ pub(crate) struct LayoutBinding {
 /// A descriptor set layout.
 #[derive(Debug)]
 pub(crate) struct DescriptorSetLayout {
-    bindings: BTreeMap<u32, LayoutBinding>,
+    /// The bindings in order of their numbers, which is that of their descriptors.
+    bindings: Vec<LayoutBinding>,
     count: usize,
     dynamic_count: usize,
     flags: vk::DescriptorSetLayoutCreateFlags,
@@ -119,13 +122,14 @@ impl DescriptorSetLayout {
             )));
         }
         let (mut count, mut dynamic_count) = (0, 0);
-        let place = |(number, info): (u32, BindingInfo)| {
+        let place = |info: BindingInfo| {
             let (first, first_dynamic) = (count, dynamic_count);
             let dynamic = is_dynamic(info.kind);
             let held = slots(&info);
             count += held as usize;
             dynamic_count += if dynamic { info.count as usize } else { 0 };
-            let binding = LayoutBinding {
+            LayoutBinding {
+                number: info.number,
                 kind: info.kind,
                 count: held,
                 inline_bytes: match info.kind {
@@ -136,17 +140,15 @@ impl DescriptorSetLayout {
                 immutable_samplers: info.immutable_samplers,
                 first,
                 first_dynamic: dynamic.then_some(first_dynamic),
-            };
-            (number, binding)
+            }
         };
-        let bindings = sorted.into_iter().map(place).collect();
+        let bindings = sorted.into_values().map(place).collect();
         Ok(Self { bindings, count, dynamic_count, flags, has_variable_count })
     }
 
     /// The binding with a variable number of descriptors, or of bytes: the last one, if any.
     pub(crate) fn variable_binding(&self) -> Option<&LayoutBinding> {
-        let last = self.bindings.values().next_back();
-        last.filter(|_| self.has_variable_count)
+        self.bindings.last().filter(|_| self.has_variable_count)
     }
 
     /// The most descriptors that the variable binding may have beside those of the other bindings (bytes, for an inline
@@ -168,7 +170,7 @@ impl DescriptorSetLayout {
     /// blocks). The variable binding has `variable_count`.
     pub(crate) fn kinds(&self, variable_count: u32) -> impl Iterator<Item = (vk::DescriptorType, u64)> {
         let last = self.variable_binding().map(|binding| binding.first);
-        self.bindings.values().map(move |binding| {
+        self.bindings.iter().map(move |binding| {
             let most = binding.count.max(binding.inline_bytes);
             let taken = match last {
                 Some(first) if first == binding.first => variable_count.min(most),
@@ -180,12 +182,20 @@ impl DescriptorSetLayout {
 
     /// The binding of that number, unless it has no descriptors.
     pub(crate) fn binding(&self, number: u32) -> Option<&LayoutBinding> {
-        self.bindings.get(&number).filter(|binding| binding.count > 0)
+        let place = self.bindings.binary_search_by_key(&number, |binding| binding.number).ok()?;
+        self.bindings.get(place).filter(|binding| binding.count > 0)
     }
 
     /// The bindings in order of their descriptors.
     pub(crate) fn bindings(&self) -> impl Iterator<Item = &LayoutBinding> {
-        self.bindings.values()
+        self.bindings.iter()
+    }
+
+    /// The bindings that descriptors `first..end` belong to.
+    pub(crate) fn overlapping(&self, first: usize, end: usize) -> &[LayoutBinding] {
+        let start = self.bindings.partition_point(|binding| binding.first + binding.count as usize <= first);
+        let stop = self.bindings.partition_point(|binding| binding.first < end);
+        self.bindings.get(start..stop).unwrap_or_default()
     }
 
     /// The number of descriptors in a set.

@@ -1,6 +1,6 @@
 //! Descriptor sets, their descriptors, and updates of them: writes, copies and templates.
 
-use super::layout::{DescriptorSetLayout, LayoutBinding};
+use super::layout::DescriptorSetLayout;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
@@ -163,7 +163,7 @@ impl DescriptorSet {
                 ),
             ));
         }
-        let written = self.overlapping(first, end);
+        let written = self.layout.overlapping(first, end);
         if let Some(other) = written.iter().find(|binding| binding.kind != write.kind) {
             return Err(Error::usage(
                 "VUID-VkWriteDescriptorSet-descriptorType-00319",
@@ -235,12 +235,6 @@ impl DescriptorSet {
                 format!("binding {binding} is no inline uniform block"),
             )),
         }
-    }
-
-    /// The bindings that descriptors `first..end` belong to.
-    fn overlapping(&self, first: usize, end: usize) -> Vec<&LayoutBinding> {
-        let overlaps = |binding: &&LayoutBinding| binding.first < end && first < binding.first + binding.count as usize;
-        self.layout.bindings().filter(overlaps).collect()
     }
 }
 

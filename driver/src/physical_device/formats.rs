@@ -48,8 +48,8 @@ fn is_color(format: Format) -> bool {
     format.aspects() == [Aspect::Color]
 }
 
-/// Reports whether components are integers that are read as floating point. Such formats are for vertex attributes,
-/// copies and blits.
+/// Reports whether components are integers that are read as floating point. Such formats are for vertex attributes
+/// and copies.
 fn is_scaled(format: Format) -> bool {
     matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
 }
@@ -68,10 +68,7 @@ const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
 /// The features of images of the format, of either tiling.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
     if is_scaled(format) {
-        return vk::FormatFeatureFlags::TRANSFER_SRC
-            | vk::FormatFeatureFlags::TRANSFER_DST
-            | vk::FormatFeatureFlags::BLIT_SRC
-            | vk::FormatFeatureFlags::BLIT_DST;
+        return vk::FormatFeatureFlags::TRANSFER_SRC | vk::FormatFeatureFlags::TRANSFER_DST;
     }
     if is_compressed(format) {
         return vk::FormatFeatureFlags::TRANSFER_SRC

@@ -231,6 +231,39 @@ impl Image {
             .and_then(|plane| plane.bound.get())
             .ok_or_else(|| Error::usage(vuid, "a command or view uses an image that is not bound to memory"))
     }
+
+    /// The columns and rows of a block, the least part that is copied: those of a compressed format, or the pair of columns
+    /// that share chroma in one plane.
+    pub(crate) fn block_extent(&self) -> [u32; 2] {
+        match self.packed_chroma() {
+            Some(_) => [2, 1],
+            None => self.desc.format.block_extent(),
+        }
+    }
+
+    /// A plane in its memory, with a texel for each block.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is not bound.
+    pub(crate) fn blocks(&self, plane: usize, vuid: &'static str) -> Result<Arc<image::Image>, Error> {
+        let bound = self.bound_plane(plane, vuid)?;
+        match self.packed_chroma() {
+            Some(format) => pairs(bound, format, vuid),
+            None => Ok(Arc::clone(bound)),
+        }
+    }
+
+    /// The format of pairs of columns that share chroma, if one plane has luma and chroma.
+    fn packed_chroma(&self) -> Option<simdevice::Format> {
+        self.ycbcr.and_then(|format| format.packed_chroma)
+    }
+}
+
+/// The bytes of an image as texels of pairs of columns.
+fn pairs(image: &image::Image, format: simdevice::Format, vuid: &'static str) -> Result<Arc<image::Image>, Error> {
+    let [width, height, _] = image.desc.extent;
+    let paired = image::Image::new(flat(format, [width / 2, height]), Arc::clone(&image.memory), image.offset);
+    paired.map(Arc::new).map_err(|error| Error::usage(vuid, error.to_string()))
 }
 
 /// The aspects of planes, by number.
@@ -348,11 +381,7 @@ impl ImageView {
             planes.push(whole(image.bound_plane(number, vuid)?));
         }
         if let Some(chroma) = format.packed_chroma {
-            // The same bytes, as texels of half of the columns.
-            let [width, height, _] = luma.desc.extent;
-            let packed = image::Image::new(flat(chroma, [width / 2, height]), Arc::clone(&luma.memory), luma.offset)
-                .map_err(|error| Error::usage(vuid, error.to_string()))?;
-            planes.push(whole(&Arc::new(packed)));
+            planes.push(whole(&pairs(luma, chroma, vuid)?));
         }
         let chroma = Chroma { planes, components: format.components, conversion: conversion.state };
         Ok(Self {

@@ -386,6 +386,9 @@ impl Format {
         };
         let registers = match value {
             ClearValue::Float(value) => value,
+            // Scaled formats hold integers.
+            ClearValue::Int(value) if plane.numeric() == Numeric::Sscaled => value.map(|component| component as f32),
+            ClearValue::Uint(value) if plane.numeric() == Numeric::Uscaled => value.map(|component| component as f32),
             ClearValue::Int(value) => value.map(|component| f32::from_bits(component as u32)),
             ClearValue::Uint(value) => value.map(f32::from_bits),
             ClearValue::DepthStencil { stencil, .. } if aspect == Aspect::Stencil => {

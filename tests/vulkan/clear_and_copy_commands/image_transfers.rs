@@ -249,6 +249,43 @@ fn slices_become_layers_of_another_format() {
     assert_eq!(out.values::<u32>(), [9, 9, 9, 9, 6, 7, 8, u32::MAX]);
 }
 
+/// A pair of columns that share chroma in one plane is a texel of twice the size.
+#[gaurast_runner::test]
+fn pairs_of_columns_are_copied_as_texels() {
+    let gpu = open();
+    let usage = vk::ImageUsageFlags::TRANSFER_SRC;
+    let [first, second] =
+        [(); 2].map(|()| Image::new(&gpu, &ImageOptions::new(vk::Format::R8G8B8A8_UNORM, [4, 3], usage)));
+    let pairs = Image::new(&gpu, &ImageOptions::new(vk::Format::G8B8G8R8_422_UNORM, [8, 3], usage));
+    let texels: Vec<u8> = (1..=48).collect();
+    first.upload(vk::ImageAspectFlags::COLOR, &texels);
+    second.upload(vk::ImageAspectFlags::COLOR, &[0; 48]);
+    let copy = |source: &Image, target: &Image, from: i32, to: i32, width: u32| {
+        gpu.run(|recording| {
+            let (device, commands) = recording.raw();
+            let region = [vk::ImageCopy::default()
+                .src_subresource(COLOR_LAYERS)
+                .src_offset(vk::Offset3D { x: from, y: 0, z: 0 })
+                .dst_subresource(COLOR_LAYERS)
+                .dst_offset(vk::Offset3D { x: to, y: 0, z: 0 })
+                .extent(vk::Extent3D { width, height: 3, depth: 1 })];
+            // SAFETY: see the crate.
+            unsafe { device.cmd_copy_image(commands, source.raw, GENERAL, target.raw, GENERAL, &region) };
+        });
+    };
+    copy(&first, &pairs, 0, 0, 4);
+    // Three of four pairs, one further to the right.
+    copy(&pairs, &second, 0, 1, 6);
+    let found = second.download(vk::ImageAspectFlags::COLOR);
+    for (row, (found, expected)) in found.chunks(16).zip(texels.chunks(16)).enumerate() {
+        assert!(found[..4] == [0; 4] && found[4..] == expected[..12], "{row}: {found:?}");
+    }
+    // A buffer has the columns one after the other.
+    let buffer = Buffer::new(&gpu, 48);
+    gpu.run(|recording| recording.download(&pairs, &buffer, &[pairs.region(vk::ImageAspectFlags::COLOR, 0)]));
+    assert_eq!(buffer.read()[..48], texels);
+}
+
 /// Breaks VUID-vkCmdBlitImage-srcImage-00230, VUID-vkCmdBlitImage-srcImage-00233,
 /// VUID-vkCmdBlitImage-dstImage-00234, VUID-vkCmdResolveImage-srcImage-00257,
 /// VUID-vkCmdResolveImage-dstImage-00259, VUID-vkCmdResolveImage-srcImage-01386 and

@@ -1,9 +1,9 @@
 //! Copies and clears.
 
 use ash::vk;
-use gaurast_testkit::Buffer;
 use gaurast_testkit::devices::{COLOR, COLOR_LAYERS, image, open};
 use gaurast_testkit::scene::extent;
+use gaurast_testkit::{Buffer, Image, ImageOptions};
 
 const GENERAL: vk::ImageLayout = vk::ImageLayout::GENERAL;
 
@@ -79,6 +79,26 @@ fn images_are_cleared_and_copied_there_and_back() {
     expected[7 + 1] = [9, 8, 7, 6];
     expected[7 + 2] = [1, 2, 3, 4];
     assert_eq!(second.colors::<[u8; 4]>(), expected);
+}
+
+/// Scaled formats are cleared to integers, which are clamped.
+#[gaurast_runner::test]
+fn scaled_images_are_cleared_to_integers() {
+    let gpu = open();
+    let usage = vk::ImageUsageFlags::TRANSFER_SRC;
+    for (format, clear, expected) in [
+        (vk::Format::R8G8_USCALED, vk::ClearColorValue { uint32: [7, 300, 0, 0] }, vec![7u8, 255]),
+        (vk::Format::R8G8_SSCALED, vk::ClearColorValue { int32: [-3, -200, 0, 0] }, vec![0xFD, 0x80]),
+        (vk::Format::R16_USCALED, vk::ClearColorValue { uint32: [0xABCD, 0, 0, 0] }, vec![0xCD, 0xAB]),
+    ] {
+        let image = Image::new(&gpu, &ImageOptions::new(format, [1, 1], usage));
+        gpu.run(|recording| {
+            let (device, commands) = recording.raw();
+            // SAFETY: see the crate.
+            unsafe { device.cmd_clear_color_image(commands, image.raw, GENERAL, &clear, &[COLOR]) };
+        });
+        assert_eq!(image.download(vk::ImageAspectFlags::COLOR), expected, "{format:?}");
+    }
 }
 
 #[gaurast_runner::test]

@@ -84,9 +84,12 @@ fn split_float(t: &mut Translator, instruction: &Instruction, op: G) -> Result<(
         if matches!(op, G::Modf | G::ModfStruct) {
             let whole = t.emit.op(op_for_width(scalar, Ir::FTrunc, Ir::FTrunc64), &[*x]);
             let fraction = t.emit.minus(scalar, *x, whole);
-            // An infinity has no fraction; zero has the sign of x.
-            let infinite = t.emit.op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
+            // Zero has the sign of x; an infinity has no fraction.
             let zero = t.emit.float(scalar, 0.0);
+            let is_zero = t.emit.op(op_for_width(scalar, Ir::FEq, Ir::FEq64), &[fraction, zero]);
+            let signed = t.emit.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[whole, zero]);
+            let fraction = t.emit.select(is_zero, signed, fraction);
+            let infinite = t.emit.op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
             first.push(t.emit.select(infinite, zero, fraction));
             second.push(whole);
         } else {

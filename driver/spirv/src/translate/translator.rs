@@ -81,7 +81,8 @@ impl Translator<'_> {
         malformed(format!("%{id} isn't defined before its use"))
     }
 
-    /// An undefined value of a type. Undefined images, samplers and pointers read as zero.
+    /// An undefined value of a type. Undefined images, samplers and pointers read as zero, and an array without a length
+    /// has no elements.
     pub fn undefined(&mut self, ty: u32) -> Result<Value> {
         let index = self.emit.u32(0);
         let nowhere = Binding { slot: 0, count: 0, index: Some(index) };
@@ -103,6 +104,7 @@ impl Translator<'_> {
                 })
                 .into(),
             ),
+            Type::RuntimeArray { .. } => Value::Regs(Rc::default()),
             _ => {
                 let scalars = types.flatten(ty)?;
                 self.emit.charge_budget(scalars.len())?;
