@@ -377,6 +377,9 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_EXT_external_memory_host"]) => {
         vkGetMemoryHostPointerPropertiesEXT: vk::PFN_vkGetMemoryHostPointerPropertiesEXT;
     }
+    Device, DeviceExtension(&[c"VK_EXT_hdr_metadata"]) => {
+        vkSetHdrMetadataEXT: vk::PFN_vkSetHdrMetadataEXT;
+    }
     Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
         vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT;
     }
@@ -4383,6 +4386,15 @@ unsafe extern "system" fn vkGetMemoryHostPointerPropertiesEXT(
             valid::output_structure(p_memory_host_pointer_properties)?,
         )
     })
+}
+
+unsafe extern "system" fn vkSetHdrMetadataEXT(
+    device: vk::Device,
+    _: u32,
+    _: *const vk::SwapchainKHR,
+    _: *const vk::HdrMetadataEXT<'_>,
+) {
+    guard(device, "vkSetHdrMetadataEXT", || Ok(()))
 }
 
 unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(

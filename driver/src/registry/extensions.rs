@@ -31,6 +31,7 @@ pub(crate) const INSTANCE: &[Extension] = &[
 pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_GAURAST_gaussian_primitive_topology", 3),
     (c"VK_AMD_shader_early_and_late_fragment_tests", 1),
+    (c"VK_ARM_rasterization_order_attachment_access", 1),
     (c"VK_EXT_4444_formats", 1),
     (c"VK_EXT_attachment_feedback_loop_dynamic_state", 1),
     (c"VK_EXT_attachment_feedback_loop_layout", 2),
@@ -54,6 +55,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_global_priority", 2),
     (c"VK_EXT_global_priority_query", 1),
     (c"VK_EXT_graphics_pipeline_library", 1),
+    (c"VK_EXT_hdr_metadata", 3),
     (c"VK_EXT_host_image_copy", 1),
     (c"VK_EXT_host_query_reset", 1),
     (c"VK_EXT_image_2d_view_of_3d", 1),
@@ -78,6 +80,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_primitives_generated_query", 1),
     (c"VK_EXT_private_data", 1),
     (c"VK_EXT_provoking_vertex", 1),
+    (c"VK_EXT_queue_family_foreign", 1),
     (c"VK_EXT_rasterization_order_attachment_access", 1),
     (c"VK_EXT_robustness2", 1),
     (c"VK_EXT_sampler_filter_minmax", 2),

@@ -185,6 +185,12 @@ features! {
         c"VK_AMD_shader_early_and_late_fragment_tests" {
         shaderEarlyAndLateFragmentTests => shader_early_and_late_fragment_tests: true;
     }
+    structure vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT:
+        c"VK_ARM_rasterization_order_attachment_access" | c"VK_EXT_rasterization_order_attachment_access" {
+        rasterizationOrderColorAttachmentAccess => rasterization_order_color_attachment_access: true;
+        rasterizationOrderDepthAttachmentAccess => rasterization_order_depth_attachment_access: true;
+        rasterizationOrderStencilAttachmentAccess => rasterization_order_stencil_attachment_access: true;
+    }
     structure vk::PhysicalDevice4444FormatsFeaturesEXT: c"VK_EXT_4444_formats" {
         formatA4R4G4B4 => format_a4r4g4b4: true;
         formatA4B4G4R4 => format_a4b4g4r4: true;
@@ -314,12 +320,6 @@ features! {
     structure vk::PhysicalDeviceProvokingVertexFeaturesEXT: c"VK_EXT_provoking_vertex" {
         provokingVertexLast => provoking_vertex_last: true;
         transformFeedbackPreservesProvokingVertex => transform_feedback_preserves_provoking_vertex: true;
-    }
-    structure vk::PhysicalDeviceRasterizationOrderAttachmentAccessFeaturesEXT:
-        c"VK_EXT_rasterization_order_attachment_access" {
-        rasterizationOrderColorAttachmentAccess => rasterization_order_color_attachment_access: true;
-        rasterizationOrderDepthAttachmentAccess => rasterization_order_depth_attachment_access: true;
-        rasterizationOrderStencilAttachmentAccess => rasterization_order_stencil_attachment_access: true;
     }
     structure vk::PhysicalDeviceRobustness2FeaturesEXT: c"VK_EXT_robustness2" | c"VK_KHR_robustness2" {
         robustBufferAccess2 => robust_buffer_access2: true;
