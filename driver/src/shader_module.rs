@@ -142,6 +142,8 @@ pub(crate) struct ShaderStage {
     specialization: Specialization,
     /// The subgroup size that the stage requires.
     pub(crate) required_subgroup_size: Option<u32>,
+    /// True if the index of a view is that of the device, which is 0.
+    pub(crate) view_is_device: bool,
     /// The last translation of a library's stage, with its options; `None` for a stage of a pipeline.
     translated: Option<Arc<Mutex<Translation>>>,
 }
@@ -178,6 +180,7 @@ impl ShaderStage {
                 name: name.to_owned(),
                 specialization: specialization(valid::optional(info.p_specialization_info))?,
                 required_subgroup_size: required.map(subgroup_size).transpose()?,
+                view_is_device: false,
                 translated: None,
             })
         }

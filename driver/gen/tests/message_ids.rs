@@ -47,6 +47,23 @@ const NEWER: [&str; 31] = [
     "VUID-vkCmdPushDescriptorSetWithTemplateKHR-descriptorUpdateTemplate-07994",
 ];
 
+/// Recorded commands that the package's version lacks, without `vkCmd`. Every such command has the rule.
+const NEWER_COMMANDS: [&str; 13] = [
+    "BindDescriptorSets2",
+    "BindIndexBuffer2",
+    "PushConstants2",
+    "PushDescriptorSet",
+    "PushDescriptorSet2",
+    "PushDescriptorSetWithTemplate",
+    "PushDescriptorSetWithTemplate2",
+    "SetAttachmentFeedbackLoopEnableEXT",
+    "SetDepthBias2EXT",
+    "SetLineStipple",
+    "SetPrimitiveRestartIndexEXT",
+    "SetRenderingAttachmentLocations",
+    "SetRenderingInputAttachmentIndices",
+];
+
 /// Collects the ids in a text.
 fn ids(text: &str, found: &mut BTreeSet<String>) {
     for (start, _) in text.match_indices("VUID-") {
@@ -107,11 +124,9 @@ fn every_recorded_command_must_be_in_a_recording() {
         .filter_map(|rest| rest.split_once('"'))
         // The extension's text leaves out implicit valid usage, because that is generated.
         .filter(|(name, _)| !name.ends_with("GAURAST"));
-    let mut count = 0;
-    for (name, _) in names {
-        let id = format!("VUID-vkCmd{name}-commandBuffer-recording");
-        assert!(known.contains(&id), "{id}");
-        count += 1;
-    }
-    assert!(count > 70, "{count} commands are recorded");
+    let (with_rule, newer): (BTreeSet<&str>, BTreeSet<&str>) = names
+        .map(|(name, _)| name)
+        .partition(|name| known.contains(&format!("VUID-vkCmd{name}-commandBuffer-recording")));
+    assert_eq!(newer, BTreeSet::from(NEWER_COMMANDS));
+    assert!(with_rule.len() > 70, "{} commands are recorded", with_rule.len());
 }

@@ -129,7 +129,8 @@ unsafe fn read_stages(
     graphics: &mut GraphicsState,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
-    let stages = unsafe { valid::slice(info.p_stages, info.stage_count)? };
+    let (stages, flags) = unsafe { (valid::slice(info.p_stages, info.stage_count)?, flags(info.flags, info.p_next)) };
+    let view_is_device = flags.contains(vk::PipelineCreateFlags::VIEW_INDEX_FROM_DEVICE_INDEX);
     for given in stages {
         let (part, stages) = if given.stage == vk::ShaderStageFlags::FRAGMENT {
             let stages = &mut graphics.fragment_shader.stages;
@@ -140,7 +141,8 @@ unsafe fn read_stages(
         };
         if parts.contains(part) {
             // SAFETY: the caller's promise.
-            let stage = unsafe { ShaderStage::from_create_info(device, given)? };
+            let mut stage = unsafe { ShaderStage::from_create_info(device, given)? };
+            stage.view_is_device = view_is_device;
             stages.push((given.stage, stage));
         }
     }

@@ -60,6 +60,7 @@ pub(crate) fn translate(
         subgroup_size: limits::SUBGROUP_SIZE,
         samples: if kind == Stage::Fragment { samples } else { 1 },
         unsized_descriptors: layout.longest_binding(),
+        view_is_device: stage.view_is_device,
     };
     let shader = stage.translate(kind, &options)?;
     layout.check(&shader.interface)?;

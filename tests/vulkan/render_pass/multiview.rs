@@ -196,6 +196,35 @@ fn render_passes_draw_every_view_to_its_layer() {
     }
 }
 
+/// With the flag, the index that shaders read is that of the device: of the group's one device, 0.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn the_index_may_be_the_devices() {
+    let gpu = own();
+    let (target, vertices) = (target(gpu), Buffer::of(gpu, &left_half()));
+    let mask = 0b1101;
+    let pass = render_pass(gpu, &[mask], false);
+    let options = views(pass, 0);
+    let flags = options.flags | vk::PipelineCreateFlags::VIEW_INDEX_FROM_DEVICE_INDEX;
+    let pipeline = Pipeline::new(gpu, &target, &PipelineOptions { flags, ..options });
+    let image = layered(gpu, vk::ImageUsageFlags::COLOR_ATTACHMENT);
+    run(
+        gpu,
+        pass,
+        &[image.view],
+        &[&|commands| {
+            commands.bind(&pipeline);
+            commands.vertices(&vertices);
+            commands.draw(0..6);
+        }],
+    );
+    for (layer, [left, right]) in pixels(&image).into_iter().enumerate() {
+        let [drawn, cleared] = if mask & (1 << layer) == 0 { [BEFORE; 2] } else { [0.0, CLEARED] };
+        assert_eq!([left, right], [[drawn; 2], [cleared; 2]], "{layer}");
+    }
+    // SAFETY: the device is idle.
+    unsafe { gpu.device().destroy_render_pass(pass, None) };
+}
+
 /// The first subpass with a view clears it, and later subpasses keep its contents.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn views_are_loaded_by_the_first_subpass_that_has_them() {

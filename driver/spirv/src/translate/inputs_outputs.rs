@@ -8,6 +8,7 @@ use isa::op::Op as Ir;
 use spirv::{BuiltIn as Spirv, Decoration};
 
 use super::emitter::Emitter;
+use super::options::Options;
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::interface::{
@@ -70,6 +71,7 @@ pub struct InputsOutputs<'a> {
     pub stage: Stage,
     pub workgroup_size: [u32; 3],
     pub subgroup_size: u32,
+    view_is_device: bool,
     /// Tessellation control: the number of vertices of an output patch.
     pub output_vertices: u32,
     pub inputs: Vec<Input>,
@@ -84,13 +86,14 @@ pub struct InputsOutputs<'a> {
 
 impl<'a> InputsOutputs<'a> {
     /// The interface of an entry point, still without inputs and outputs.
-    pub fn new(module: &'a Module, globals: &'a Globals, interface: &Interface, subgroup_size: u32) -> Self {
+    pub fn new(module: &'a Module, globals: &'a Globals, interface: &Interface, options: &Options) -> Self {
         Self {
             module,
             globals,
             stage: interface.stage,
             workgroup_size: interface.workgroup_size,
-            subgroup_size,
+            subgroup_size: options.subgroup_size,
+            view_is_device: options.view_is_device,
             output_vertices: interface.modes.output_vertices.unwrap_or(0),
             inputs: Vec::new(),
             outputs: Vec::new(),
@@ -302,7 +305,7 @@ impl<'a> InputsOutputs<'a> {
             Spirv::BaseVertex => BuiltIn::BaseVertex,
             Spirv::BaseInstance => BuiltIn::BaseInstance,
             Spirv::DrawIndex => BuiltIn::DrawIndex,
-            Spirv::ViewIndex => BuiltIn::ViewIndex,
+            Spirv::ViewIndex if !self.view_is_device => BuiltIn::ViewIndex,
             Spirv::Layer => BuiltIn::Layer,
             Spirv::ViewportIndex => BuiltIn::ViewportIndex,
             Spirv::PrimitiveId => BuiltIn::PrimitiveId,
@@ -351,7 +354,7 @@ impl<'a> InputsOutputs<'a> {
             }
             Spirv::WorkgroupSize => emit.u32([x, y, z][axis]),
             Spirv::HelperInvocation => emit.builder.is_helper(),
-            Spirv::DeviceIndex => emit.u32(0),
+            Spirv::DeviceIndex | Spirv::ViewIndex => emit.u32(0),
             Spirv::SubgroupSize => emit.u32(size),
             Spirv::NumSubgroups => emit.u32(invocations.div_ceil(size.max(1))),
             Spirv::SubgroupId => {

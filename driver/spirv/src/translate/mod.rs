@@ -113,7 +113,7 @@ fn translate_here(
         analysis: &analysis,
         options: *options,
         emit: Emitter::new(),
-        io: InputsOutputs::new(module, &globals, &interface, options.subgroup_size),
+        io: InputsOutputs::new(module, &globals, &interface, options),
         promoted: PromotedVariables::default(),
         interface,
         never_contracted: never_contracted(module, &globals, entry)?,

@@ -9,10 +9,12 @@ pub struct Options {
     pub samples: u32,
     /// The length used for a descriptor array without one.
     pub unsized_descriptors: u32,
+    /// True if the index of a view is that of the device, which is 0.
+    pub view_is_device: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { subgroup_size: 64, samples: 1, unsized_descriptors: 1 }
+        Self { subgroup_size: 64, samples: 1, unsized_descriptors: 1, view_is_device: false }
     }
 }

@@ -57,7 +57,7 @@ pub fn all_shaders() -> Vec<String> {
 }
 
 /// The options of the tests' translations.
-pub const OPTIONS: Options = Options { subgroup_size: 16, samples: 4, unsized_descriptors: 1 };
+pub const OPTIONS: Options = Options { subgroup_size: 16, samples: 4, unsized_descriptors: 1, view_is_device: false };
 
 /// Translates a checked-in shader.
 pub fn translated(name: &str, specialization: &Specialization) -> Shader {
