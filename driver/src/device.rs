@@ -440,6 +440,7 @@ mod tests {
             count::<vk::PhysicalDevicePageableDeviceLocalMemoryFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceShaderQuadControlFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR<'_>>(),
             count::<newer::PhysicalDevicePrimitiveRestartIndexFeaturesEXT>(),
             count::<newer::PhysicalDeviceShaderReplicatedCompositesFeaturesEXT>(),
             count::<newer::PhysicalDeviceZeroInitializeDeviceMemoryFeaturesEXT>(),
@@ -451,7 +452,7 @@ mod tests {
             counts,
             [
                 44, 10, 43, 14, 21, 1, 1, 1, 2, 3, 1, 3, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1, 16, 1,
-                2, 1, 3, 1, 1, 1, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 30
+                2, 1, 3, 1, 1, 1, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 30
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

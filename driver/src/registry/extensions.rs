@@ -164,6 +164,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_shader_relaxed_extended_instruction", 1),
     (c"VK_KHR_shader_subgroup_extended_types", 1),
     (c"VK_KHR_shader_subgroup_rotate", 2),
+    (c"VK_KHR_shader_subgroup_uniform_control_flow", 1),
     (c"VK_KHR_shader_terminate_invocation", 1),
     (c"VK_KHR_spirv_1_4", 1),
     (c"VK_KHR_storage_buffer_storage_class", 1),

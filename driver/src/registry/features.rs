@@ -426,6 +426,10 @@ features! {
         c"VK_KHR_shader_relaxed_extended_instruction" {
         shaderRelaxedExtendedInstruction => shader_relaxed_extended_instruction: true;
     }
+    structure vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR:
+        c"VK_KHR_shader_subgroup_uniform_control_flow" {
+        shaderSubgroupUniformControlFlow => shader_subgroup_uniform_control_flow: true;
+    }
     structure crate::registry::newer::PhysicalDeviceUnifiedImageLayoutsFeaturesKHR: c"VK_KHR_unified_image_layouts" {
         unifiedImageLayouts => unified_image_layouts: true;
         unifiedImageLayoutsVideo => unified_image_layouts_video: false;
