@@ -80,8 +80,8 @@ fn zeroed_memory_is_zero_again() {
 /// Priorities from 0 to 1 are taken; others are warned of.
 #[gaurast_runner::test]
 fn priorities_of_memory_are_taken() {
-    let mut pageable = vk::PhysicalDevicePageableDeviceLocalMemoryFeaturesEXT::default();
-    pageable.pageable_device_local_memory = vk::TRUE;
+    let mut pageable =
+        vk::PhysicalDevicePageableDeviceLocalMemoryFeaturesEXT::default().pageable_device_local_memory(true);
     let mut features = vk::PhysicalDeviceMemoryPriorityFeaturesEXT::default().memory_priority(true);
     features.p_next = (&raw mut pageable).cast();
     let names = [ash::ext::memory_priority::NAME, ash::ext::pageable_device_local_memory::NAME];

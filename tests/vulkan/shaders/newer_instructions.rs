@@ -123,7 +123,7 @@ fn quads_vote() {
         true
     });
     // Quad n has the lowest bits of n.
-    let mine: Vec<u32> = (0..LANES).map(|lane| lane / 4 >> (lane % 4) & 1).collect();
+    let mine: Vec<u32> = (0..LANES).map(|lane| ((lane / 4) >> (lane % 4)) & 1).collect();
     for gpu in with_quads() {
         let found = run(&gpu, &words, &mine, &[]);
         for lane in 0..LANES {
