@@ -122,7 +122,9 @@ fn geometric(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()>
         _ => 2,
     };
     let (scalars, operands) = operands(t, instruction, 2, count)?;
-    let scalar = scalars[0];
+    let result = scalars[0];
+    // Squares of halves leave a half's range, and are rounded at the end alone.
+    let scalar = if result == (Scalar::Float { width: 16 }) { Scalar::Float { width: 32 } } else { result };
     let x = &operands[0];
     let regs = match op {
         G::Length => vec![length(t, scalar, x)?],
@@ -172,7 +174,7 @@ fn geometric(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()>
         }
         _ => refract(t, instruction, scalar, x, &operands[1])?,
     };
-    let regs = regs.into_iter().map(|reg| t.emit.wrap_to_width(scalar, reg)).collect();
+    let regs = regs.into_iter().map(|reg| t.emit.wrap_to_width(result, reg)).collect();
     t.define(instruction, regs)
 }
 
