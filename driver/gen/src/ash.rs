@@ -1,4 +1,5 @@
-//! Declarations of ash, of gaurast, and of the driver for what is newer than ash: the Rust names and types of the registry's structures and commands.
+//! Declarations of ash, of gaurast, and of the driver for what is newer than ash: the Rust names and types of the
+//! registry's structures and commands.
 
 use crate::error::Error;
 use crate::file::File;
