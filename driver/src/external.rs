@@ -100,13 +100,22 @@ pub(crate) unsafe fn close(fd: c_int) {
 /// [`Error::InvalidExternalHandle`] if the descriptor is of something else.
 pub(crate) fn import(fd: c_int, kind: Kind, size: u64) -> Result<Arc<Allocation>, Error> {
     let file = borrow(fd)?;
-    let failed = |error: ImportError| refuse(fd, error);
+    let failed = |error: ImportError| match error {
+        ImportError::Host(host) if is_exhausted(&host) => Error::OutOfHostMemory(host.to_string()),
+        error => refuse(fd, error),
+    };
     let found = shared::label(file).map_err(failed)?;
     let wanted = label(kind, size);
     if found != wanted {
         return Err(refuse(fd, difference(&found, kind, size)));
     }
     Allocation::import(file, size).map_err(failed)
+}
+
+/// Reports whether the host has no more memory or descriptors.
+fn is_exhausted(error: &std::io::Error) -> bool {
+    use rustix::io::Errno;
+    Errno::from_io_error(error).is_some_and(|code| [Errno::MFILE, Errno::NFILE, Errno::NOMEM].contains(&code))
 }
 
 /// The difference between a label and that of an object.

@@ -294,6 +294,13 @@ impl Payloads {
         }
     }
 
+    /// The permanent payload; one that is temporary ends.
+    pub(crate) fn restore(&self) -> Arc<Payload> {
+        let mut held = self.lock();
+        held.temporary = None;
+        Arc::clone(&held.permanent)
+    }
+
     /// Replaces the payload, temporarily or for ever.
     pub(crate) fn replace(&self, payload: Arc<Payload>, is_temporary: bool) {
         let mut held = self.lock();
@@ -332,7 +339,7 @@ mod sync_file {
         if rustix::fs::FileType::from_raw_mode(status.st_mode) != rustix::fs::FileType::Unknown {
             return Err(refuse("it is of a file, a pipe, a socket or a device"));
         }
-        file.try_clone_to_owned().map_err(|error| Error::TooManyObjects(error.to_string()))
+        file.try_clone_to_owned().map_err(|error| Error::OutOfHostMemory(error.to_string()))
     }
 }
 

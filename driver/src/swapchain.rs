@@ -8,7 +8,7 @@ use crate::abi::guard::panic_message;
 use crate::abi::handle::{self, objects};
 use crate::abi::sanitizer::ignore_thread;
 use crate::abi::valid;
-use crate::command::submit::{Batch, enqueue, waited};
+use crate::command::submit::{Batch, enqueue, with_values};
 use crate::device::Device;
 use crate::device_sync::{DeviceSync, WaitResult, deadline};
 use crate::queue::Queue;
@@ -410,8 +410,7 @@ pub(crate) unsafe fn queue_present(queue: &Queue, present_info: &vk::PresentInfo
         // SAFETY: the caller's promise.
         unsafe { valid::output_slice(info.p_results, swapchains.len())? }
     };
-    let waits = waited(&waits).into_iter().map(|payload| (payload, 0));
-    let batch = Batch { waits: waits.collect(), ..Batch::default() };
+    let batch = Batch { waits: with_values(waits, &[]), commands: Vec::new(), signals: Vec::new() };
     enqueue(queue, vec![batch], None)?;
     let mut results = results.iter_mut();
     let mut whole = Ok(vk::Result::SUCCESS);

@@ -39,11 +39,9 @@ impl Fence {
         self.payloads.current().signal(0);
     }
 
-    /// Resets the fence. An import that is temporary ends.
+    /// Resets the fence. An import that is temporary ends before that.
     fn reset(&self) {
-        if let (payload, false) = self.payloads.take() {
-            payload.reset();
-        }
+        self.payloads.restore().reset();
     }
 }
 

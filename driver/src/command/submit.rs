@@ -18,21 +18,35 @@ use std::sync::Arc;
 /// The commands of a command buffer at its submission.
 pub(crate) type Commands = (Arc<Vec<Command>>, PendingUse);
 
-/// A batch: payloads of semaphores to wait for, command buffers, payloads to signal. Each payload has a timeline's value.
-#[derive(Debug, Default)]
-pub(crate) struct Batch {
-    /// The payloads that are waited for first.
-    pub(crate) waits: Vec<(Arc<Payload>, u64)>,
+/// A batch: semaphores to wait for, command buffers, semaphores to signal; or, once it is submitted, their payloads. Each
+/// has a timeline's value.
+#[derive(Debug)]
+pub(crate) struct Batch<S> {
+    /// What is waited for first.
+    pub(crate) waits: Vec<(Arc<S>, u64)>,
     /// The command buffers that are executed.
     pub(crate) commands: Vec<Commands>,
-    /// The payloads that are signaled last.
-    pub(crate) signals: Vec<(Arc<Payload>, u64)>,
+    /// What is signaled last.
+    pub(crate) signals: Vec<(Arc<S>, u64)>,
+}
+
+impl Batch<Semaphore> {
+    /// The batch with its semaphores' payloads. Imports that are temporary end here, if they are waited for.
+    fn take_payloads(self) -> Batch<Payload> {
+        let wait = |(semaphore, value): (Arc<Semaphore>, u64)| (semaphore.payloads().take().0, value);
+        let signal = |(semaphore, value): (Arc<Semaphore>, u64)| (semaphore.payloads().submit_signal(), value);
+        Batch {
+            waits: self.waits.into_iter().map(wait).collect(),
+            commands: self.commands,
+            signals: self.signals.into_iter().map(signal).collect(),
+        }
+    }
 }
 
 /// One `vkQueueSubmit`.
 pub(crate) struct Submission {
     /// Its batches.
-    pub(crate) batches: Vec<Batch>,
+    pub(crate) batches: Vec<Batch<Payload>>,
     /// The payload of the fence that is signaled when all of them are done.
     pub(crate) fence: Option<Arc<Payload>>,
     /// The state that can be waited for on the device, and its loss.
@@ -67,7 +81,7 @@ impl Submission {
     }
 }
 
-fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Error> {
+fn execute_batch(batch: Batch<Payload>, execution: &mut Execution<'_>) -> Result<(), Error> {
     for (payload, value) in &batch.waits {
         execution.wait(payload.outside(), || payload.is_reached(*value))?;
         // A wait for a binary semaphore unsignals it.
@@ -83,11 +97,12 @@ fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Erro
     Ok(())
 }
 
-/// Passes batches to the queue's thread.
+/// Passes batches to the queue's thread. Nothing fails before that, so that what isn't submitted changes no semaphore.
 ///
 /// # Errors
 /// [`Error::DeviceLost`].
-pub(crate) fn enqueue(queue: &Queue, batches: Vec<Batch>, fence: Option<&Arc<Fence>>) -> Result<(), Error> {
+pub(crate) fn enqueue(queue: &Queue, batches: Vec<Batch<Semaphore>>, fence: Option<&Arc<Fence>>) -> Result<(), Error> {
+    let batches = batches.into_iter().map(Batch::take_payloads).collect();
     let fence = fence.map(|fence| fence.payloads().submit_signal());
     let submission =
         Submission { batches, fence, sync: Arc::clone(queue.sync()), instance: Arc::clone(queue.instance()) };
@@ -98,7 +113,7 @@ pub(crate) fn enqueue(queue: &Queue, batches: Vec<Batch>, fence: Option<&Arc<Fen
 ///
 /// # Safety
 /// The info, its chain and its handles are valid.
-unsafe fn batch(info: &vk::SubmitInfo<'_>) -> Result<Batch, Error> {
+unsafe fn batch(info: &vk::SubmitInfo<'_>) -> Result<Batch<Semaphore>, Error> {
     // SAFETY: the caller's promise.
     unsafe {
         let values = valid::find_in_chain::<vk::TimelineSemaphoreSubmitInfo>(info.p_next);
@@ -113,43 +128,33 @@ unsafe fn batch(info: &vk::SubmitInfo<'_>) -> Result<Batch, Error> {
         let signals = valid::slice(info.p_signal_semaphores, info.signal_semaphore_count)?;
         let command_buffers = valid::slice(info.p_command_buffers, info.command_buffer_count)?;
         Ok(Batch {
-            waits: with_values(waited(&handle::get_all(waits)?), wait_values),
+            waits: with_values(handle::get_all(waits)?, wait_values),
             commands: commands(command_buffers.iter().copied())?,
-            signals: with_values(signaled(&handle::get_all(signals)?), signal_values),
+            signals: with_values(handle::get_all(signals)?, signal_values),
         })
     }
 }
 
-/// The payloads of semaphores that a batch waits for. Imports that are temporary end here.
-pub(crate) fn waited(semaphores: &[Arc<Semaphore>]) -> Vec<Arc<Payload>> {
-    host::collect(semaphores.iter().map(|semaphore| semaphore.payloads().take().0))
-}
-
-/// The payloads of semaphores that a batch signals.
-fn signaled(semaphores: &[Arc<Semaphore>]) -> Vec<Arc<Payload>> {
-    host::collect(semaphores.iter().map(|semaphore| semaphore.payloads().submit_signal()))
-}
-
-/// Pairs payloads with timeline values; binary semaphores need none.
-fn with_values(payloads: Vec<Arc<Payload>>, values: &[u64]) -> Vec<(Arc<Payload>, u64)> {
+/// Pairs semaphores with timeline values; binary semaphores need none.
+pub(crate) fn with_values(semaphores: Vec<Arc<Semaphore>>, values: &[u64]) -> Vec<(Arc<Semaphore>, u64)> {
     let values = values.iter().copied().chain(std::iter::repeat(0));
-    host::collect(payloads.into_iter().zip(values))
+    host::collect(semaphores.into_iter().zip(values))
 }
 
 /// The batch of a `VkSubmitInfo2`.
 ///
 /// # Safety
 /// The info and its handles are valid.
-unsafe fn batch2(info: &vk::SubmitInfo2<'_>) -> Result<Batch, Error> {
+unsafe fn batch2(info: &vk::SubmitInfo2<'_>) -> Result<Batch<Semaphore>, Error> {
     // SAFETY: the caller's promise.
     unsafe {
         let waits = valid::slice(info.p_wait_semaphore_infos, info.wait_semaphore_info_count)?;
         let signals = valid::slice(info.p_signal_semaphore_infos, info.signal_semaphore_info_count)?;
         let command_buffers = valid::slice(info.p_command_buffer_infos, info.command_buffer_info_count)?;
         Ok(Batch {
-            waits: with_values(waited(&semaphores(waits)?), &timeline_values(waits)),
+            waits: with_values(semaphores(waits)?, &timeline_values(waits)),
             commands: commands(command_buffers.iter().map(|info| info.command_buffer))?,
-            signals: with_values(signaled(&semaphores(signals)?), &timeline_values(signals)),
+            signals: with_values(semaphores(signals)?, &timeline_values(signals)),
         })
     }
 }
@@ -260,8 +265,9 @@ mod tests {
             recorder.end().unwrap();
             let submission = Submission {
                 batches: vec![Batch {
+                    waits: Vec::new(),
                     commands: vec![recorder.submit(&Enabled::strict()).unwrap()],
-                    ..Batch::default()
+                    signals: Vec::new(),
                 }],
                 fence: Some(fence),
                 sync: Arc::clone(&self.sync),

@@ -164,7 +164,9 @@ impl DescriptorSet {
             ));
         }
         let written = self.layout.overlapping(first, end);
-        if let Some(other) = written.iter().find(|binding| binding.kind != write.kind) {
+        // Bindings without descriptors are skipped.
+        let other = written.iter().find(|binding| binding.count > 0 && binding.kind != write.kind);
+        if let Some(other) = other {
             return Err(Error::usage(
                 "VUID-VkWriteDescriptorSet-descriptorType-00319",
                 format!(

@@ -122,6 +122,8 @@ pub(crate) struct AttachmentState {
     /// The components that are written, a bit each, if writes are enabled.
     pub(super) write_mask: u8,
     pub(super) write_enable: bool,
+    /// True if the pipeline has the attachment, whatever attachments a pass has.
+    is_used: bool,
 }
 
 /// The equation that gives the source.
@@ -130,14 +132,19 @@ const REPLACE: BlendEquation =
 
 impl AttachmentState {
     /// The state that writes the source unchanged.
-    const WRITTEN: Self =
-        Self { blend_enable: false, equations: BlendEquations::both(REPLACE), write_mask: 0xf, write_enable: true };
+    const WRITTEN: Self = Self {
+        blend_enable: false,
+        equations: BlendEquations::both(REPLACE),
+        write_mask: 0xf,
+        write_enable: true,
+        is_used: true,
+    };
 
     /// The state for the device.
     fn blend_state(self) -> BlendState {
         BlendState {
             equations: self.blend_enable.then_some(self.equations),
-            write_mask: if self.write_enable { self.write_mask } else { 0 },
+            write_mask: if self.write_enable && self.is_used { self.write_mask } else { 0 },
         }
     }
 }
@@ -148,19 +155,19 @@ impl AttachmentState {
 /// An [`Error`] if their number is not that of the attachments, or for state that the device doesn't support.
 fn attachment_states(graphics: &GraphicsState) -> Result<Vec<AttachmentState>, Error> {
     let enables = &graphics.fragment_output.color_write_enables;
+    let formats = &graphics.fragment_output.color_formats;
     let with_enables = |index: usize, state: AttachmentState| AttachmentState {
         write_enable: enables.get(index).is_none_or(|&enable| enable != vk::FALSE),
+        is_used: formats.get(index).is_some_and(|&format| format != vk::Format::UNDEFINED),
         ..state
     };
     if graphics.has_dynamic_blending() {
-        let count = graphics.fragment_output.color_formats.len();
-        let states = (0..count).map(|index| with_enables(index, AttachmentState::WRITTEN));
+        let states = (0..formats.len()).map(|index| with_enables(index, AttachmentState::WRITTEN));
         return Ok(states.collect());
     }
-    let formats = &graphics.fragment_output.color_formats;
     if graphics.fragment_output.blend.is_empty() && formats.iter().all(|&format| format == vk::Format::UNDEFINED) {
         // No attachment is used, so there need be no blend state.
-        return Ok(vec![AttachmentState::WRITTEN; formats.len()]);
+        return Ok(vec![AttachmentState { is_used: false, ..AttachmentState::WRITTEN }; formats.len()]);
     }
     if graphics.fragment_output.blend.len() != formats.len() {
         return Err(Error::usage(
@@ -648,7 +655,11 @@ impl FixedFunctionState {
                 other => other,
             },
             logic_op: self.logic_op_enable.then_some(self.logic_op),
-            blend: self.attachments.iter().map(|it| it.blend_state()).collect(),
+            blend: match &self.attachments[..] {
+                // A pass may have attachments where the pipeline has none.
+                [] => vec![BlendState { equations: None, write_mask: 0 }],
+                attachments => attachments.iter().map(|it| it.blend_state()).collect(),
+            },
             ..self.draw.clone()
         }
     }

@@ -19,6 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Memory {
     allocation: Arc<Allocation>,
     heap: Arc<Heap>,
+    /// The bytes that it takes of the heap.
+    taken: u64,
     /// True if the host may map it.
     host_visible: bool,
     mapped: AtomicBool,
@@ -49,7 +51,22 @@ impl Memory {
         }
         heap.take(size)?;
         let allocation = allocate().inspect_err(|_| heap.give_back(size))?;
-        Ok(Self { allocation, heap: Arc::clone(heap), host_visible, mapped: AtomicBool::new(false) })
+        let (heap, mapped) = (Arc::clone(heap), AtomicBool::new(false));
+        Ok(Self { allocation, heap, taken: size, host_visible, mapped })
+    }
+
+    /// Memory that is the application's own, of which the heap gives nothing.
+    ///
+    /// # Safety
+    /// As for [`host_memory`].
+    unsafe fn of_host(heap: &Arc<Heap>, pointer: *mut c_void, size: u64) -> Result<Self, Error> {
+        if size == 0 {
+            return Err(Error::usage("VUID-VkMemoryAllocateInfo-allocationSize-07899", "allocationSize is 0"));
+        }
+        // SAFETY: the caller's promise.
+        let allocation = unsafe { host_memory(pointer, size)? };
+        let (heap, mapped) = (Arc::clone(heap), AtomicBool::new(false));
+        Ok(Self { allocation, heap, taken: 0, host_visible: true, mapped })
     }
 
     /// The allocation.
@@ -88,7 +105,7 @@ impl Memory {
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        self.heap.give_back(self.allocation.len());
+        self.heap.give_back(self.taken);
     }
 }
 
@@ -144,7 +161,7 @@ pub(crate) unsafe fn allocate_memory(
                 ));
             }
             // SAFETY: the caller's promise.
-            Memory::of(heap, size, host_visible, || unsafe { host_memory(host.p_host_pointer, size) })?
+            unsafe { Memory::of_host(heap, host.p_host_pointer, size)? }
         }
         (None, None) if exports.is_empty() => Memory::new(heap, size, host_visible)?,
         (None, None) => Memory::of(heap, size, host_visible, || {

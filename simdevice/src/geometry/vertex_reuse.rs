@@ -30,7 +30,7 @@ pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
         Some(stream) if draw.state.primitive_restart => {
             let restart = stream.restart_index();
             let (mut start, mut indices) = (0, Vec::new());
-            // Indices outside the buffer read as zero, so that they never restart.
+            // Indices outside the buffer read as zero.
             let known = stream.len().saturating_sub(u64::from(draw.first));
             let known = known.min(u64::from(draw.count)) as u32;
             for block in (0..known).step_by(SCAN as usize) {
@@ -43,7 +43,7 @@ pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
                     }
                 }
             }
-            runs.push(start, draw.count);
+            runs.push(start, if restart == 0 { known } else { draw.count });
         }
         _ => runs.push(0, draw.count),
     }

@@ -71,13 +71,16 @@ fn what_one_of_them_lacks_is_not_written() {
     );
     let image = |format, usage| Image::new(&gpu, &ImageOptions::new(format, [SIDE; 2], usage));
     let clear = Pass { depth: vk::ClearDepthStencilValue { depth: 0.25, stencil: 0 }, ..Pass::clear([9.0; 4]) };
-    for (formats, depth_format) in [
-        (vec![COLOR, COLOR], DEPTH),
-        (vec![COLOR, COLOR], NONE),
-        (vec![NONE, COLOR], NONE),
-        (vec![COLOR, NONE], DEPTH),
-        (vec![COLOR], NONE),
-        (vec![], NONE),
+    // The alpha of the first output is above 1, so that it covers all where it is the coverage.
+    for (formats, depth_format, coverage) in [
+        (vec![COLOR, COLOR], DEPTH, false),
+        (vec![COLOR, COLOR], NONE, true),
+        (vec![NONE, COLOR], NONE, false),
+        (vec![NONE, COLOR], NONE, true),
+        (vec![COLOR, NONE], DEPTH, false),
+        (vec![COLOR], NONE, false),
+        (vec![], NONE, false),
+        (vec![], NONE, true),
     ] {
         let graphics = Graphics {
             shaders: vec![Shader::vertex(vertex.clone()), Shader::fragment(fragment.clone())],
@@ -85,6 +88,7 @@ fn what_one_of_them_lacks_is_not_written() {
             formats: formats.clone(),
             depth_format,
             depth_stencil: depth_test(vk::CompareOp::LESS),
+            multisample: Graphics::default().multisample.alpha_to_coverage_enable(coverage),
             ..Graphics::default()
         };
         let pipeline = graphics.create(&gpu).expect("a pipeline");

@@ -249,6 +249,41 @@ fn a_queue_waits_for_a_sync_file() {
     destroy_fences(&gpu, &[done]);
 }
 
+/// A reset ends an import, and unsignals the fence's own payload.
+#[gaurast_runner::test]
+fn a_reset_is_of_the_own_payload() {
+    let gpu = open();
+    let own = own_fence(&gpu);
+    submit(&gpu, &[], &[], own);
+    wait_for_fence(&gpu, own, SOON).unwrap();
+    import_fence_of(&gpu, own, FenceTypes::SYNC_FD, vk::FenceImportFlags::TEMPORARY, -1).unwrap();
+    // SAFETY: see the crate.
+    unsafe {
+        gpu.device().reset_fences(&[own]).unwrap();
+        assert!(!gpu.device().get_fence_status(own).unwrap());
+    }
+    destroy_fences(&gpu, &[own]);
+}
+
+/// A submission that fails changes no semaphore: an import that it waits for is there for the next.
+#[gaurast_runner::test]
+fn a_failed_submission_leaves_an_import() {
+    let gpu = open();
+    let waited = semaphore(&gpu, SemaphoreTypes::empty(), None).unwrap();
+    let done = own_fence(&gpu);
+    import_semaphore_of(&gpu, waited, SemaphoreTypes::SYNC_FD, TEMPORARY, -1).unwrap();
+    let wait = [vk::SemaphoreSubmitInfo::default().semaphore(waited)];
+    let no_commands = [vk::CommandBufferSubmitInfo::default()];
+    let submits = [vk::SubmitInfo2::default().wait_semaphore_infos(&wait).command_buffer_infos(&no_commands)];
+    // SAFETY: see the crate; the command buffer is null.
+    let result = unsafe { gpu.device().queue_submit2(gpu.queue(), &submits, vk::Fence::null()) };
+    assert!(result.is_err(), "a null command buffer");
+    submit(&gpu, &[(waited, 0)], &[], done);
+    wait_for_fence(&gpu, done, SOON).unwrap();
+    destroy_semaphores(&gpu, &[waited]);
+    destroy_fences(&gpu, &[done]);
+}
+
 /// Breaks VUID-VkSemaphoreGetFdInfoKHR-handleType-01135.
 #[gaurast_runner::test]
 fn a_sync_file_of_a_semaphore_is_exported_before_the_signal() {
