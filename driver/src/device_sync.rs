@@ -51,7 +51,9 @@ impl Outside<'_> {
     fn wait(self, seen: u32, time: Duration) {
         match self {
             Self::Word(word) => shared::wait(word, seen, time.min(Self::LOSS)),
-            Self::File(file) => wait_for_file(file, time.min(Self::LOSS)),
+            Self::File(file) => {
+                is_readable(file, time.min(Self::LOSS));
+            }
             Self::Several => std::thread::sleep(time.min(Self::LOOK)),
         }
     }
@@ -65,19 +67,20 @@ impl Outside<'_> {
     }
 }
 
-/// Waits until a file is readable, at most for `time`.
-fn wait_for_file(file: BorrowedFd<'_>, time: Duration) {
+/// Waits until a file is readable or broken, at most for `time`. Returns false if it is not; may return early.
+pub(crate) fn is_readable(file: BorrowedFd<'_>, time: Duration) -> bool {
     #[cfg(target_os = "linux")]
     {
         use rustix::event::{PollFd, PollFlags, Timespec, poll};
+        // A time that the clock can't represent is longer than any wait.
         let time = Timespec::try_from(time).ok();
-        // Every result has the caller look again.
-        let _ = poll(&mut [PollFd::from_borrowed_fd(file, PollFlags::IN)], time.as_ref());
+        poll(&mut [PollFd::from_borrowed_fd(file, PollFlags::IN)], time.as_ref()).is_ok_and(|count| count > 0)
     }
     #[cfg(not(target_os = "linux"))]
     {
         let _ = file;
         std::thread::sleep(time.min(Outside::LOOK));
+        true
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::abi::error::Error;
 use crate::abi::sanitizer::{acquire, release};
-use crate::device_sync::{DeviceSync, Outside};
+use crate::device_sync::{DeviceSync, Outside, is_readable};
 use crate::external::{self, Kind};
 use simdevice::Allocation;
 use simdevice::shared;
@@ -11,6 +11,7 @@ use std::ffi::c_int;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// A payload. Submissions keep those that they wait for and signal.
 #[derive(Debug)]
@@ -82,7 +83,7 @@ struct SyncFile {
 impl SyncFile {
     fn is_signaled(&self) -> bool {
         self.is_signaled.load(Ordering::Acquire)
-            || self.file.as_ref().is_none_or(|file| sync_file::is_signaled(file.as_fd()))
+            || self.file.as_ref().is_none_or(|file| is_readable(file.as_fd(), Duration::ZERO))
     }
 }
 
@@ -233,7 +234,7 @@ impl Payload {
         }
     }
 
-    /// Where the payload changes without this device.
+    /// The place where the payload changes without this device.
     pub(crate) fn outside(&self) -> Option<Outside<'_>> {
         match &self.state {
             State::Binary(_) | State::Timeline(_) => None,
@@ -317,16 +318,8 @@ impl Payloads {
 mod sync_file {
     use crate::abi::error::Error;
     use crate::external;
-    use rustix::event::{PollFd, PollFlags, Timespec, poll};
     use std::ffi::c_int;
-    use std::os::fd::{BorrowedFd, OwnedFd};
-
-    /// Reports whether a sync file is signaled, or broken.
-    pub(super) fn is_signaled(file: BorrowedFd<'_>) -> bool {
-        let mut files = [PollFd::from_borrowed_fd(file, PollFlags::IN)];
-        let none = Timespec { tv_sec: 0, tv_nsec: 0 };
-        poll(&mut files, Some(&none)).is_ok_and(|count| count > 0)
-    }
+    use std::os::fd::OwnedFd;
 
     /// A descriptor of the application's sync file.
     pub(super) fn duplicate(fd: c_int) -> Result<OwnedFd, Error> {
@@ -348,11 +341,7 @@ mod sync_file {
 mod sync_file {
     use crate::abi::error::Error;
     use std::ffi::c_int;
-    use std::os::fd::{BorrowedFd, OwnedFd};
-
-    pub(super) fn is_signaled(_: BorrowedFd<'_>) -> bool {
-        true
-    }
+    use std::os::fd::OwnedFd;
 
     pub(super) fn duplicate(_: c_int) -> Result<OwnedFd, Error> {
         Err(Error::InvalidExternalHandle("the host has no sync files".to_owned()))
@@ -363,7 +352,7 @@ mod sync_file {
 mod tests {
     use super::*;
     use crate::device_sync::{WaitResult, deadline};
-    use std::time::{Duration, Instant};
+    use std::time::Instant;
 
     fn wait(sync: &DeviceSync, payload: &Payload, nanoseconds: u64) -> WaitResult {
         sync.wait_for(deadline(nanoseconds), payload.outside(), || payload.is_reached(1))

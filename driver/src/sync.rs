@@ -236,15 +236,46 @@ pub(crate) fn signal_semaphore(semaphore: &Semaphore, value: u64) -> Result<(), 
     Ok(())
 }
 
-/// The export of a payload that has no file: the object was not created for handles of the type, or holds an import of
-/// another type.
-fn not_exported(rule: &'static str, handle_type: impl std::fmt::Debug) -> Error {
-    Error::usage(rule, format!("the object's payload has no handles of type {handle_type:?}"))
+/// A kind of descriptor by which payloads are exported.
+#[derive(Clone, Copy)]
+enum FileKind {
+    Opaque,
+    Sync,
 }
 
-/// The export of a sync file that nothing would signal.
-fn never_signaled(rule: &'static str) -> Error {
-    Error::usage(rule, "a sync file is exported that nothing submitted will signal")
+/// The rules on the export of a payload.
+struct ExportRules {
+    /// The payload must have such a descriptor.
+    kind: &'static str,
+    /// A sync file's payload must be signaled, or submitted to be.
+    signal: &'static str,
+}
+
+/// A descriptor of the present payload of a fence or a semaphore, which `exports` such ones. The export of a sync file
+/// unsignals the object.
+fn export(
+    sync: &Arc<DeviceSync>,
+    payloads: &Payloads,
+    kind: Option<FileKind>,
+    exports: bool,
+    rules: &ExportRules,
+) -> Result<c_int, Error> {
+    let payload = payloads.current();
+    match (kind, payload.file()) {
+        (Some(FileKind::Opaque), Some(file)) => external::export(file),
+        (Some(FileKind::Sync), _) if payload.has_sync_file(exports) => {
+            let fd = payload.export_sync_file()?;
+            let fd = fd.ok_or_else(|| {
+                Error::usage(rules.signal, "a sync file is exported that nothing submitted will signal")
+            })?;
+            // What is submitted signals the file alone.
+            if let (_, false) = payloads.take() {
+                payloads.replace(Payload::binary(sync, false), false);
+            }
+            Ok(fd)
+        }
+        _ => Err(Error::usage(rules.kind, "the object's payload has no handles of this type")),
+    }
 }
 
 #[doc(alias = "vkGetSemaphoreFdKHR")]
@@ -252,24 +283,16 @@ pub(crate) fn get_semaphore_fd(
     semaphore: &Semaphore,
     handle_type: vk::ExternalSemaphoreHandleTypeFlags,
 ) -> Result<c_int, Error> {
-    use vk::ExternalSemaphoreHandleTypeFlags as Types;
-    let payload = semaphore.payloads.current();
-    match handle_type {
-        Types::OPAQUE_FD => match payload.file() {
-            Some(file) => external::export(file),
-            None => Err(not_exported("VUID-VkSemaphoreGetFdInfoKHR-handleType-01132", handle_type)),
-        },
-        Types::SYNC_FD if payload.has_sync_file(semaphore.exports.contains(handle_type)) => {
-            let fd = payload.export_sync_file()?;
-            let fd = fd.ok_or_else(|| never_signaled("VUID-VkSemaphoreGetFdInfoKHR-handleType-01135"))?;
-            // The export is a wait, too.
-            if let (_, false) = semaphore.payloads.take() {
-                semaphore.payloads.replace(Payload::binary(&semaphore.sync, false), false);
-            }
-            Ok(fd)
-        }
-        _ => Err(not_exported("VUID-VkSemaphoreGetFdInfoKHR-handleType-01132", handle_type)),
-    }
+    let kind = match handle_type {
+        vk::ExternalSemaphoreHandleTypeFlags::OPAQUE_FD => Some(FileKind::Opaque),
+        vk::ExternalSemaphoreHandleTypeFlags::SYNC_FD => Some(FileKind::Sync),
+        _ => None,
+    };
+    let rules = ExportRules {
+        kind: "VUID-VkSemaphoreGetFdInfoKHR-handleType-01132",
+        signal: "VUID-VkSemaphoreGetFdInfoKHR-handleType-01135",
+    };
+    export(&semaphore.sync, &semaphore.payloads, kind, semaphore.exports.contains(handle_type), &rules)
 }
 
 #[doc(alias = "vkImportSemaphoreFdKHR")]
@@ -310,24 +333,16 @@ pub(crate) fn import_semaphore_fd(
 
 #[doc(alias = "vkGetFenceFdKHR")]
 pub(crate) fn get_fence_fd(fence: &Fence, handle_type: vk::ExternalFenceHandleTypeFlags) -> Result<c_int, Error> {
-    use vk::ExternalFenceHandleTypeFlags as Types;
-    let payload = fence.payloads.current();
-    match handle_type {
-        Types::OPAQUE_FD => match payload.file() {
-            Some(file) => external::export(file),
-            None => Err(not_exported("VUID-VkFenceGetFdInfoKHR-handleType-01453", handle_type)),
-        },
-        Types::SYNC_FD if payload.has_sync_file(fence.exports.contains(handle_type)) => {
-            let fd = payload.export_sync_file()?;
-            let fd = fd.ok_or_else(|| never_signaled("VUID-VkFenceGetFdInfoKHR-handleType-01454"))?;
-            // The export is a reset, too; what is submitted signals the file alone.
-            if let (_, false) = fence.payloads.take() {
-                fence.payloads.replace(Payload::binary(&fence.sync, false), false);
-            }
-            Ok(fd)
-        }
-        _ => Err(not_exported("VUID-VkFenceGetFdInfoKHR-handleType-01453", handle_type)),
-    }
+    let kind = match handle_type {
+        vk::ExternalFenceHandleTypeFlags::OPAQUE_FD => Some(FileKind::Opaque),
+        vk::ExternalFenceHandleTypeFlags::SYNC_FD => Some(FileKind::Sync),
+        _ => None,
+    };
+    let rules = ExportRules {
+        kind: "VUID-VkFenceGetFdInfoKHR-handleType-01453",
+        signal: "VUID-VkFenceGetFdInfoKHR-handleType-01454",
+    };
+    export(&fence.sync, &fence.payloads, kind, fence.exports.contains(handle_type), &rules)
 }
 
 #[doc(alias = "vkImportFenceFdKHR")]

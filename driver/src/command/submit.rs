@@ -22,11 +22,11 @@ pub(crate) type Commands = (Arc<Vec<Command>>, PendingUse);
 /// has a timeline's value.
 #[derive(Debug)]
 pub(crate) struct Batch<S> {
-    /// What is waited for first.
+    /// The semaphores or payloads that are waited for first.
     pub(crate) waits: Vec<(Arc<S>, u64)>,
     /// The command buffers that are executed.
     pub(crate) commands: Vec<Commands>,
-    /// What is signaled last.
+    /// The semaphores or payloads that are signaled last.
     pub(crate) signals: Vec<(Arc<S>, u64)>,
 }
 

@@ -34,39 +34,26 @@ impl Memory {
     /// # Errors
     /// [`Error::OutOfDeviceMemory`] if the heap or the host has not enough.
     pub(crate) fn new(heap: &Arc<Heap>, size: u64, host_visible: bool) -> Result<Self, Error> {
-        Self::of(heap, size, host_visible, || {
+        Self::of(heap, size, size, host_visible, || {
             Allocation::new(size, host_visible).map_err(|error| Error::OutOfDeviceMemory(error.to_string()))
         })
     }
 
-    /// Takes `size` bytes of `heap` for an allocation of that size.
+    /// Takes `taken` bytes of `heap` for an allocation of `size` bytes: all of them, or none if they are the application's.
     fn of(
         heap: &Arc<Heap>,
         size: u64,
+        taken: u64,
         host_visible: bool,
         allocate: impl FnOnce() -> Result<Arc<Allocation>, Error>,
     ) -> Result<Self, Error> {
         if size == 0 {
             return Err(Error::usage("VUID-VkMemoryAllocateInfo-allocationSize-07899", "allocationSize is 0"));
         }
-        heap.take(size)?;
-        let allocation = allocate().inspect_err(|_| heap.give_back(size))?;
+        heap.take(taken)?;
+        let allocation = allocate().inspect_err(|_| heap.give_back(taken))?;
         let (heap, mapped) = (Arc::clone(heap), AtomicBool::new(false));
-        Ok(Self { allocation, heap, taken: size, host_visible, mapped })
-    }
-
-    /// Memory that is the application's own, of which the heap gives nothing.
-    ///
-    /// # Safety
-    /// As for [`host_memory`].
-    unsafe fn of_host(heap: &Arc<Heap>, pointer: *mut c_void, size: u64) -> Result<Self, Error> {
-        if size == 0 {
-            return Err(Error::usage("VUID-VkMemoryAllocateInfo-allocationSize-07899", "allocationSize is 0"));
-        }
-        // SAFETY: the caller's promise.
-        let allocation = unsafe { host_memory(pointer, size)? };
-        let (heap, mapped) = (Arc::clone(heap), AtomicBool::new(false));
-        Ok(Self { allocation, heap, taken: 0, host_visible: true, mapped })
+        Ok(Self { allocation, heap, taken, host_visible, mapped })
     }
 
     /// The allocation.
@@ -147,7 +134,7 @@ pub(crate) unsafe fn allocate_memory(
         }
         (Some(file), None) => {
             check_import(file.handle_type, MEMORY_FD, "VUID-VkImportMemoryFdInfoKHR-handleType-00667")?;
-            let memory = Memory::of(heap, size, host_visible, || external::import(file.fd, kind, size))?;
+            let memory = Memory::of(heap, size, size, host_visible, || external::import(file.fd, kind, size))?;
             // SAFETY: an import gives the descriptor to the driver, which has used it.
             unsafe { external::close(file.fd) };
             memory
@@ -161,10 +148,10 @@ pub(crate) unsafe fn allocate_memory(
                 ));
             }
             // SAFETY: the caller's promise.
-            unsafe { Memory::of_host(heap, host.p_host_pointer, size)? }
+            Memory::of(heap, size, 0, host_visible, || unsafe { host_memory(host.p_host_pointer, size) })?
         }
         (None, None) if exports.is_empty() => Memory::new(heap, size, host_visible)?,
-        (None, None) => Memory::of(heap, size, host_visible, || {
+        (None, None) => Memory::of(heap, size, size, host_visible, || {
             let allocated = Allocation::new_shared(size, &external::label(kind, size));
             allocated.map_err(|error| Error::OutOfDeviceMemory(error.to_string()))
         })?,

@@ -478,7 +478,7 @@ fn processes_share_memory_and_survive_each_other(case: &Case) {
     free(&gpu, buffer, memory);
 }
 
-/// What the child does.
+/// The work of the child process.
 fn misbehave() {
     let file = inherited(FILE);
     let gpu = open();

@@ -126,7 +126,7 @@ fn a_draw_reads_what_it_replaces(case: &Case) {
     }
 }
 
-/// Whether attachments are read may be dynamic; they can be in any case.
+/// The reading of attachments may be a dynamic state; it is possible in any case.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn feedback_may_be_dynamic() {
     let mut layout =

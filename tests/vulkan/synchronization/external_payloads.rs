@@ -475,7 +475,7 @@ const HOST_TRIPS: u64 = 10_000;
 /// Round trips of the queues, by binary semaphores.
 const QUEUE_TRIPS: u32 = 1_000;
 
-/// What a process has of the shared objects.
+/// The shared objects of a process.
 struct Side {
     gpu: Gpu,
     memory: vk::DeviceMemory,

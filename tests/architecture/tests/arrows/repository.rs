@@ -7,7 +7,7 @@ use gaurast_runner::Need;
 
 use crate::workspace;
 
-/// What the repository has at the top level: the project's folders, and what every project has.
+/// The entries of the top level: the project's folders, and what every project has.
 const TOP_LEVEL: [&str; 26] = [
     ".ci",
     ".dockerignore",
