@@ -1,4 +1,5 @@
-"""Builds the Python package: maturin's backend (PEP 517), which first builds the driver, the layers and the command.
+"""Builds the Python package: maturin's backend (PEP 517), which first builds the driver, the layers and the command. The package
+has one copy of the driver, which its module, its command and the Vulkan loader load.
 
 `python backend.py wheel FOLDER` builds the wheel of a release: by zig, for manylinux2014, with a Vulkan loader if GAURAST_LOADER
 names one's file. It needs maturin, cargo-zigbuild and ziglang from PyPI. `python backend.py sdist FOLDER` makes the source archive.
@@ -21,7 +22,7 @@ _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE if (_HERE / "Cargo.lock").exists() else _HERE.parent.parent
 _PACKAGE = _ROOT / "api/python"
 _TARGET = "x86_64-unknown-linux-gnu"
-_PACKAGES = ["gaurast-icd", "gaurast-layer", "gaurast-emulation-layer", "gaurast-cli"]
+_LIBRARY_PACKAGES = ["gaurast-icd", "gaurast-layer", "gaurast-emulation-layer"]
 _MANIFESTS = {
     "gaurast_icd.json": "driver/icd",
     "gaurast_layer.json": "api/layer",
@@ -34,14 +35,23 @@ def _target_folder() -> Path:
     return Path(os.environ.get("CARGO_TARGET_DIR", _ROOT / "target"))
 
 
-def _build(subcommand: list[str], target: list[str]) -> Path:
-    """Builds the driver, the layers and the command, and returns their folder."""
-    if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
-        sys.exit("gaurast: the driver is built for Linux on x86-64 alone")
-    packages = [word for package in _PACKAGES for word in ("-p", package)]
-    command = ["cargo", *subcommand, "--locked", "--profile", "dist", *target, *packages]
-    subprocess.run(command, cwd=_ROOT, check=True)
-    return _target_folder() / (_TARGET if target else "") / "dist"
+class _Build:
+    """Builds of the profile `dist` by a subcommand of cargo."""
+
+    def __init__(self, subcommand: str, target: list[str]) -> None:
+        if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
+            sys.exit("gaurast: the driver is built for Linux on x86-64 alone")
+        self._cargo = ["cargo", subcommand, "--locked", "--profile", "dist", *target]
+        self.folder = _target_folder() / (_TARGET if target else "") / "dist"
+
+    def run(self, packages: list[str], *options: str) -> None:
+        words = [word for package in packages for word in ("-p", package)]
+        subprocess.run([*self._cargo, *words, *options], cwd=_ROOT, check=True)
+
+    def run_all(self) -> None:
+        """Builds the driver, the layers, and the command without a driver of its own."""
+        self.run(_LIBRARY_PACKAGES)
+        self.run(["gaurast-cli"], "--no-default-features")
 
 
 def collect(built: Path, package: Path = _PACKAGE / "python/gaurast") -> None:
@@ -116,7 +126,9 @@ def build_wheel(wheel_directory: str, config_settings: object = None, metadata_d
     import maturin
 
     _licences()
-    collect(_build(["build"], []))
+    build = _Build("build", [])
+    build.run_all()
+    collect(build.folder)
     name: str = maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
     return name
 
@@ -130,9 +142,13 @@ get_requires_for_build_sdist = get_requires_for_build_wheel
 
 
 def release_wheel(folder: str) -> None:
-    """Builds the wheel of a release, for glibc 2.17 or later."""
+    """Builds the wheel of a release, for glibc 2.17 or later. The build folder is left with the command that has the driver inside,
+    for an archive or a package."""
     _licences()
-    collect(_build(["zigbuild"], ["--target", f"{_TARGET}.2.17"]))
+    build = _Build("zigbuild", ["--target", f"{_TARGET}.2.17"])
+    build.run_all()
+    collect(build.folder)
+    build.run(["gaurast-cli"])
     command = ["maturin", "build", "--zig", "--locked", "--target", _TARGET, "--compatibility", "manylinux2014"]
     subprocess.run([*command, "--out", str(Path(folder).resolve())], cwd=_PACKAGE, check=True)
 

@@ -241,6 +241,15 @@ const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
     vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw() | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
 );
 
+/// Whether an image of this usage may be an attachment.
+fn is_rendered_to(usage: vk::ImageUsageFlags) -> bool {
+    let attachments = vk::ImageUsageFlags::COLOR_ATTACHMENT
+        | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
+        | vk::ImageUsageFlags::TRANSIENT_ATTACHMENT
+        | READ_ATTACHMENT;
+    usage.intersects(attachments)
+}
+
 fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
     if usage.intersects(READ_ATTACHMENT) && !features.intersects(ATTACHMENT) {
         return false;
@@ -357,7 +366,13 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         max_extent,
         max_mip_levels: if is_split { 1 } else { max_extent.width.ilog2() + 1 },
         max_array_layers: if is_split { 1 } else { layers },
-        sample_counts: if has_samples { limits::SAMPLE_COUNTS } else { vk::SampleCountFlags::TYPE_1 },
+        sample_counts: match has_samples {
+            true if is_rendered_to(usage) || device_format(format).is_none_or(|format| !is_color(format)) => {
+                limits::SAMPLE_COUNTS
+            }
+            true => limits::STORED_SAMPLE_COUNTS,
+            false => vk::SampleCountFlags::TYPE_1,
+        },
         max_resource_size: memory::heap_size(),
     })
 }

@@ -52,6 +52,9 @@ const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::limits::MAX_CLIP_CULL_DISTANCES 
 pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags =
     vk::SampleCountFlags::from_raw(vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw());
 
+/// The sample counts of images that only shaders and copies access: all that there are.
+pub(crate) const STORED_SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(0x7f);
+
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
 
@@ -262,11 +265,11 @@ fn find_properties() -> Properties {
         framebuffer_stencil_sample_counts: SAMPLE_COUNTS,
         framebuffer_no_attachments_sample_counts: SAMPLE_COUNTS,
         max_color_attachments: MAX_COLOR_ATTACHMENTS,
-        sampled_image_color_sample_counts: SAMPLE_COUNTS,
-        sampled_image_integer_sample_counts: SAMPLE_COUNTS,
+        sampled_image_color_sample_counts: STORED_SAMPLE_COUNTS,
+        sampled_image_integer_sample_counts: STORED_SAMPLE_COUNTS,
         sampled_image_depth_sample_counts: SAMPLE_COUNTS,
         sampled_image_stencil_sample_counts: SAMPLE_COUNTS,
-        storage_image_sample_counts: SAMPLE_COUNTS,
+        storage_image_sample_counts: STORED_SAMPLE_COUNTS,
         max_sample_mask_words: 1,
         timestamp_compute_and_graphics: true,
         timestamp_period: 1.0,

@@ -1,4 +1,4 @@
-//! Devices of other drivers, which the Vulkan loader finds.
+//! This driver, and devices of other drivers, which the Vulkan loader finds.
 
 use std::io::Write;
 
@@ -19,6 +19,30 @@ pub enum DeviceError {
     Render(#[from] RenderError),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
+    #[cfg(not(feature = "driver"))]
+    #[error(transparent)]
+    Installation(#[from] crate::icd::IcdError),
+    #[cfg(not(feature = "driver"))]
+    #[error(transparent)]
+    Driver(#[from] gaurast_render::DriverError),
+}
+
+/// This driver's entry.
+#[cfg(feature = "driver")]
+#[expect(clippy::unnecessary_wraps, reason = "a driver that is loaded can be missing")]
+pub fn own_driver() -> Result<ash::Entry, DeviceError> {
+    Ok(vulkan_gaurast::entry())
+}
+
+/// The entry of the driver that is installed with the command.
+///
+/// # Errors
+/// If it is not there, or cannot be loaded.
+#[cfg(not(feature = "driver"))]
+pub fn own_driver() -> Result<ash::Entry, DeviceError> {
+    let library = crate::icd::library()?;
+    // SAFETY: the library is the driver that was built with this command.
+    Ok(unsafe { gaurast_render::load_driver(&library)? })
 }
 
 /// The loader's entry, whose devices draw Gaussians by compute kernels where they lack the extension.

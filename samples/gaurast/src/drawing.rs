@@ -130,7 +130,7 @@ impl Drawing {
         if device.is_some() && work_trace.is_some() {
             return Err(DrawError::Trace);
         }
-        let entry = if device.is_some() { devices::entry()? } else { vulkan_gaurast::entry() };
+        let entry = if device.is_some() { devices::entry()? } else { devices::own_driver()? };
         let options = DeviceOptions {
             work_trace,
             device: device.unwrap_or_default().to_owned(),

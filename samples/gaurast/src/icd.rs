@@ -24,11 +24,42 @@ pub enum IcdError {
     Command(std::io::Error),
     #[error("{}: there is no manifest of the driver where the command is installed, such as {}", folder.display(), MANIFESTS[0])]
     Missing { folder: PathBuf },
+    #[cfg(any(test, not(feature = "driver")))]
+    #[error("{}: {reason}", manifest.display())]
+    Manifest { manifest: PathBuf, reason: String },
 }
 
 /// The first of `places` from `folder` that exists.
 fn find(folder: &Path, places: [&str; 3]) -> Option<PathBuf> {
     places.iter().find_map(|place| folder.join(place).canonicalize().ok())
+}
+
+/// The folder of this command.
+fn installation() -> Result<PathBuf, IcdError> {
+    let command = std::env::current_exe().and_then(|path| path.canonicalize()).map_err(IcdError::Command)?;
+    Ok(command.parent().unwrap_or(Path::new("/")).to_owned())
+}
+
+fn manifest_of(folder: &Path) -> Result<PathBuf, IcdError> {
+    find(folder, MANIFESTS).ok_or_else(|| IcdError::Missing { folder: folder.to_owned() })
+}
+
+/// The library of the installation's driver, as its manifest names it.
+///
+/// # Errors
+/// [`IcdError`].
+#[cfg(not(feature = "driver"))]
+pub fn library() -> Result<PathBuf, IcdError> {
+    library_of(&manifest_of(&installation()?)?)
+}
+
+#[cfg(any(test, not(feature = "driver")))]
+fn library_of(manifest: &Path) -> Result<PathBuf, IcdError> {
+    let wrong = |reason: String| IcdError::Manifest { manifest: manifest.to_owned(), reason };
+    let text = std::fs::read(manifest).map_err(|error| wrong(error.to_string()))?;
+    let json: serde_json::Value = serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))?;
+    let path = json["ICD"]["library_path"].as_str().ok_or_else(|| wrong("it names no library".to_owned()))?;
+    Ok(manifest.parent().unwrap_or(Path::new("/")).join(path))
 }
 
 /// A word of a shell, in quotes.
@@ -41,12 +72,11 @@ fn quoted(path: &Path) -> String {
 /// # Errors
 /// [`IcdError`].
 pub fn lines() -> Result<String, IcdError> {
-    let command = std::env::current_exe().and_then(|path| path.canonicalize()).map_err(IcdError::Command)?;
-    lines_of(command.parent().unwrap_or(Path::new("/")))
+    lines_of(&installation()?)
 }
 
 fn lines_of(folder: &Path) -> Result<String, IcdError> {
-    let manifest = find(folder, MANIFESTS).ok_or_else(|| IcdError::Missing { folder: folder.to_owned() })?;
+    let manifest = manifest_of(folder)?;
     let mut lines = String::new();
     for name in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
         let _ = writeln!(lines, "export {name}={}", quoted(&manifest));
@@ -77,5 +107,20 @@ mod tests {
         let expected = format!("export VK_DRIVER_FILES='{in_quotes}/share/vulkan/icd.d/gaurast_icd.json'");
         assert_eq!(lines.lines().next(), Some(&*expected));
         assert!(lines.ends_with("/share/vulkan/explicit_layer.d'\n"), "{lines}");
+    }
+
+    #[test]
+    fn the_driver_is_the_one_that_the_manifest_names() {
+        let root = tempfile::tempdir().expect("a folder");
+        let manifest = root.path().join("gaurast_icd.json");
+        let library = |text: &str| {
+            std::fs::write(&manifest, text).expect("a manifest");
+            library_of(&manifest)
+        };
+        let near = library(include_str!("../../../driver/icd/gaurast_icd.json")).expect("a library");
+        assert_eq!(near, root.path().join("../../target/release/libvulkan_gaurast.so"));
+        assert_eq!(library(r#"{"ICD": {"library_path": "/a/b.so"}}"#).expect("a library"), Path::new("/a/b.so"));
+        let sentence = library("{}").expect_err("no library").to_string();
+        assert!(sentence.ends_with("gaurast_icd.json: it names no library"), "{sentence}");
     }
 }

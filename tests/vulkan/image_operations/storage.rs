@@ -8,43 +8,64 @@ use simdevice::Format;
 use simdevice::format::Numeric;
 use vk::ImageUsageFlags as Usage;
 
-/// Each sample is written, counted in, read, and resolved.
+/// Each sample is written, counted in, read as an image and as a texture, and resolved, for each number of samples that images have
+/// which are no attachments. What no sample is changes nothing.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn samples_are_stored_and_read_one_by_one() {
+    let counts = own().limits().storage_image_sample_counts;
+    for samples in (1..7).map(|power| 1 << power) {
+        assert!(counts.contains(vk::SampleCountFlags::from_raw(samples)), "{samples} samples");
+        store_and_read_samples(samples);
+    }
+}
+
+fn store_and_read_samples(samples: u32) {
     const SIDE: u32 = 8;
     let gpu = own();
     let image = |format, size: u32, layers, view| {
-        let options = ImageOptions { layers, samples: 4, view, ..ImageOptions::new(format, [size; 2], Usage::STORAGE) };
+        let usage = Usage::STORAGE | Usage::SAMPLED;
+        let options = ImageOptions { layers, samples, view, ..ImageOptions::new(format, [size; 2], usage) };
         Image::new(gpu, &options)
     };
     let flat = image(vk::Format::R8G8B8A8_UNORM, SIDE, 1, vk::ImageViewType::TYPE_2D);
     let array = vk::ImageViewType::TYPE_2D_ARRAY;
     let counts = image(vk::Format::R32_UINT, SIDE / 2, 2, array);
-    let results = Buffer::new(gpu, 4 * 2 * 4 * u64::from(SIDE * SIDE));
+    let results = Buffer::new(gpu, 4 * 3 * u64::from(samples * SIDE * SIDE));
+    let nearest = Sampler::new(gpu, &vk::SamplerCreateInfo::default());
     let bindings = Bindings::new(
         gpu,
-        &[Resource::StorageImage(flat.view), Resource::StorageImage(counts.view), Resource::Storage(results.raw)],
+        &[
+            Resource::StorageImage(flat.view),
+            Resource::StorageImage(counts.view),
+            Resource::Storage(results.raw),
+            Resource::Texture(flat.view, nearest.raw),
+        ],
     );
-    let declarations = "
+    let declarations = format!(
+        "const int SAMPLES = {samples};
         layout(local_size_x = 8, local_size_y = 8) in;
         layout(binding = 0, rgba8) uniform image2DMS flat_image;
         layout(binding = 1, r32ui) uniform uimage2DMSArray counts;
-        layout(binding = 2) buffer Results { uint results[]; };";
+        layout(binding = 2) buffer Results {{ uint results[]; }};
+        layout(binding = 3) uniform sampler2DMS flat_texture;"
+    );
     let store = Kernel::new(
         gpu,
         &format!(
             "{declarations}
             void main() {{
                 ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-                for (int s = 0; s < 4; s++) {{
+                for (int s = 0; s < SAMPLES; s++) {{
                     for (int layer = 0; layer < 2; layer++)
                         if (at.x < 4 && at.y < 4)
                             imageStore(counts, ivec3(at, layer), s, uvec4(10 * layer));
-                    imageStore(flat_image, at, s, vec4(at, 40 * s, 255) / 255.0);
+                    imageStore(flat_image, at, s, vec4(at, 4 * s, 255) / 255.0);
                 }}
+                imageStore(flat_image, at, SAMPLES, vec4(1.0));
+                imageStore(flat_image, at, -1, vec4(1.0));
                 memoryBarrierImage();
                 barrier();
-                for (int s = 0; s < 4; s++)
+                for (int s = 0; s < SAMPLES; s++)
                     imageAtomicAdd(counts, ivec3(at / 2, 1), s, 1 + s);
             }}"
         ),
@@ -57,10 +78,11 @@ fn samples_are_stored_and_read_one_by_one() {
             void main() {{
                 ivec2 at = ivec2(gl_GlobalInvocationID.xy);
                 for (int s = 0; s < imageSamples(flat_image); s++) {{
-                    uint place = (at.y * 8 + at.x) * 4 + s;
+                    uint place = (at.y * 8 + at.x) * SAMPLES + s;
                     results[place] = packUnorm4x8(imageLoad(flat_image, at, s));
+                    results[128 * SAMPLES + place] = packUnorm4x8(texelFetch(flat_texture, at, s));
                     uint low = imageLoad(counts, ivec3(at / 2, 0), s).x;
-                    results[256 + place] = low + 1000 * imageLoad(counts, ivec3(at / 2, 1), s).x;
+                    results[64 * SAMPLES + place] = low + 1000 * imageLoad(counts, ivec3(at / 2, 1), s).x;
                 }}
             }}"
         ),
@@ -69,13 +91,15 @@ fn samples_are_stored_and_read_one_by_one() {
     store.run(&[bindings.set], &[], [1, 1, 1]);
     load.run(&[bindings.set], &[], [1, 1, 1]);
     let found = results.values::<u32>();
-    for place in 0..4 * SIDE * SIDE {
-        let (x, y, sample) = (place / 4 % SIDE, place / 4 / SIDE, place % 4);
-        let texel = u32::from_le_bytes([x as u8, y as u8, 40 * sample as u8, 255]);
-        assert_eq!(found[place as usize], texel, "{x}, {y}, sample {sample}");
+    let all = samples * SIDE * SIDE;
+    for place in 0..all {
+        let (x, y, sample) = (place / samples % SIDE, place / samples / SIDE, place % samples);
+        let texel = u32::from_le_bytes([x as u8, y as u8, 4 * sample as u8, 255]);
+        assert_eq!(found[place as usize], texel, "{x}, {y}, sample {sample} of {samples}");
+        assert_eq!(found[(2 * all + place) as usize], texel, "{x}, {y}, sample {sample} of {samples} of the texture");
         // Four pixels add to each texel of the second layer.
         let counted = 1000 * (10 + 4 * (1 + sample));
-        assert_eq!(found[256 + place as usize], counted, "{x}, {y}, sample {sample}");
+        assert_eq!(found[(all + place) as usize], counted, "{x}, {y}, sample {sample} of {samples}");
     }
 
     let whole = Image::new(gpu, &ImageOptions::new(vk::Format::R8G8B8A8_UNORM, [SIDE; 2], Usage::SAMPLED));
@@ -100,7 +124,7 @@ fn samples_are_stored_and_read_one_by_one() {
     });
     for (place, texel) in whole.colors::<[u8; 4]>().into_iter().enumerate() {
         let (x, y) = (place as u8 % SIDE as u8, place as u8 / SIDE as u8);
-        assert_eq!(texel, [x, y, 60, 255]);
+        assert_eq!(texel, [x, y, 2 * (samples as u8 - 1), 255], "the mean of {samples} samples");
     }
 }
 

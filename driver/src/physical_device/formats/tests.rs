@@ -101,8 +101,11 @@ fn attachments_of_two_dimensions_may_have_four_samples() {
     let counts = |query| image_properties(query).unwrap().sample_counts;
     let (one, four) = (vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4);
     assert_eq!(counts(query), one | four);
-    let stored = ImageQuery { usage: vk::ImageUsageFlags::STORAGE, ..query };
-    assert_eq!(counts(stored), one | four);
+    let stored = ImageQuery { usage: vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::SAMPLED, ..query };
+    assert_eq!(counts(stored), vk::SampleCountFlags::from_raw(0x7f), "what is no attachment has any number");
+    let read =
+        ImageQuery { usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, format: vk::Format::D32_SFLOAT, ..query };
+    assert_eq!(counts(ImageQuery { usage: vk::ImageUsageFlags::SAMPLED, ..read }), one | four);
     let depth = ImageQuery {
         format: vk::Format::D24_UNORM_S8_UINT,
         usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
