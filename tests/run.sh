@@ -100,6 +100,7 @@ absent() {
 tests=(--workspace --profile checked --lib --bins --tests)
 step format cargo fmt --all --check
 step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
+step clippy-without-driver cargo clippy --package gaurast-cli --no-default-features --profile checked --quiet -- -D warnings
 # The documentation of the crates that applications use: no broken link.
 public=()
 for crate in gaurast gaurast-emulation gaurast-scene gaurast-picture gaurast-render gaurast-layer gaurast-driver; do

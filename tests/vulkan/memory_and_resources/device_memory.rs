@@ -196,7 +196,7 @@ fn images_beyond_the_limits_are_refused() {
         wide,
         good.mip_levels(40),
         good.array_layers(u32::MAX),
-        good.samples(vk::SampleCountFlags::TYPE_2),
+        good.samples(vk::SampleCountFlags::TYPE_2).usage(vk::ImageUsageFlags::COLOR_ATTACHMENT),
         good.format(vk::Format::ASTC_4X4_SFLOAT_BLOCK),
         good.format(vk::Format::R8G8B8A8_SRGB).usage(vk::ImageUsageFlags::STORAGE),
         good.flags(vk::ImageCreateFlags::SPARSE_BINDING),
