@@ -2,7 +2,8 @@
 has one copy of the driver, which its module, its command and the Vulkan loader load.
 
 `python backend.py wheel FOLDER` builds the wheel of a release: by zig, for manylinux2014, with a Vulkan loader if GAURAST_LOADER
-names one's file. It needs maturin, cargo-zigbuild and ziglang from PyPI. `python backend.py sdist FOLDER` makes the source archive.
+names one's file, such as Debian 11's, since a newer one does not load on older systems. It needs maturin, cargo-zigbuild and ziglang
+from PyPI. `python backend.py sdist FOLDER` makes the source archive.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ _MANIFESTS = {
     "gaurast_layer.json": "api/layer",
     "gaurast_emulation.json": "api/emulation/layer",
 }
+# The C library of the oldest systems that the wheel of a release runs on. Its loader may need that of Debian 11.
+_GLIBC = "2.17"
+_GLIBC_OF_LOADER = 31
 _LIBRARIES = ["libvulkan_gaurast.so", "libVkLayer_gaurast_validation.so", "libVkLayer_gaurast_emulation.so"]
 
 
@@ -73,6 +77,15 @@ def collect(built: Path, package: Path = _PACKAGE / "python/gaurast") -> None:
         shutil.copy(loader, libraries / "loader/libvulkan.so.1")
         notice = "libvulkan.so.1 is the Vulkan loader of the Khronos Group and LunarG, under the Apache License 2.0.\n"
         (libraries / "loader/NOTICE").write_text(notice)
+
+
+def _check_loader() -> None:
+    """Refuses a Vulkan loader that older systems cannot load."""
+    loader = os.environ.get("GAURAST_LOADER")
+    if loader:
+        newest = max(int(minor) for minor in re.findall(rb"GLIBC_2\.(\d+)", Path(loader).read_bytes()))
+        if newest > _GLIBC_OF_LOADER:
+            sys.exit(f"gaurast: GAURAST_LOADER: {loader} needs glibc 2.{newest}, and the wheel's is to run with 2.{_GLIBC_OF_LOADER}")
 
 
 def _licences() -> None:
@@ -144,8 +157,9 @@ get_requires_for_build_sdist = get_requires_for_build_wheel
 def release_wheel(folder: str) -> None:
     """Builds the wheel of a release, for glibc 2.17 or later. The build folder is left with the command that has the driver inside,
     for an archive or a package."""
+    _check_loader()
     _licences()
-    build = _Build("zigbuild", ["--target", f"{_TARGET}.2.17"])
+    build = _Build("zigbuild", ["--target", f"{_TARGET}.{_GLIBC}"])
     build.run_all()
     collect(build.folder)
     build.run(["gaurast-cli"])
