@@ -32,6 +32,8 @@ _MANIFESTS = {
 # The C library of the oldest systems that the wheel of a release runs on. Its loader may need that of Debian 11.
 _GLIBC = "2.17"
 _GLIBC_OF_LOADER = 31
+# The most megabytes of the wheel of a release.
+_WHEEL_MEGABYTES = 12
 _LIBRARIES = ["libvulkan_gaurast.so", "libVkLayer_gaurast_validation.so", "libVkLayer_gaurast_emulation.so"]
 
 
@@ -165,6 +167,10 @@ def release_wheel(folder: str) -> None:
     build.run(["gaurast-cli"])
     command = ["maturin", "build", "--zig", "--locked", "--target", _TARGET, "--compatibility", "manylinux2014"]
     subprocess.run([*command, "--out", str(Path(folder).resolve())], cwd=_PACKAGE, check=True)
+    for wheel in Path(folder).glob(f"gaurast-{_version()}-*.whl"):
+        megabytes = wheel.stat().st_size / 1e6
+        if megabytes > _WHEEL_MEGABYTES:
+            sys.exit(f"gaurast: {wheel} has {megabytes:.1f} MB, and its budget is {_WHEEL_MEGABYTES}")
 
 
 if __name__ == "__main__":

@@ -316,7 +316,7 @@ fn find_properties() -> Properties {
             | vk::SubgroupFeatureFlags::ROTATE_KHR
             | vk::SubgroupFeatureFlags::ROTATE_CLUSTERED_KHR,
         subgroup_quad_operations_in_all_stages: true,
-        point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
+        point_clipping_behavior: vk::PointClippingBehavior::USER_CLIP_PLANES_ONLY,
         max_multiview_view_count: u32::BITS,
         max_multiview_instance_index: u32::MAX >> 1,
         protected_no_fault: false,

@@ -234,7 +234,8 @@ impl<'a> SegmentSetup<'a> {
     }
 
     fn point(&mut self, primitive: &mut AssembledPrimitive, [vertex]: [&Vertex; 1]) {
-        if vertex.code & (code::CLIP | code::ANY_SIDE | code::ANY_CULL) != 0 {
+        // A large point may extend into the view volume from outside of its sides.
+        if vertex.code & (code::CLIP | code::ANY_CULL) != 0 {
             return;
         }
         self.out.clipped += 1;

@@ -33,19 +33,24 @@ fn points_are_squares_of_their_size() {
     }
 }
 
+/// The near and the far plane clip points by their centre. Points whose centre is beside the view volume are drawn where they extend
+/// into it.
 #[gaurast_runner::test]
-fn points_are_clipped_by_their_centre() {
+fn points_are_clipped_by_depth_alone() {
     let device = device(1);
     let positions = [
         at_pixel(199.5, 149.5, 0.5),
-        at_pixel(200.5, 50.0, 0.5),
-        at_pixel(50.0, -0.5, 0.5),
+        at_pixel(201.5, 50.0, 0.5),
+        at_pixel(50.0, -1.25, 0.5),
+        at_pixel(203.0, 50.0, 0.5),
         at_pixel(50.0, 50.0, 1.5),
         at_pixel(50.0, 50.0, -0.5),
     ];
-    let found = run(&device, &draw(&device, Topology::PointList, &positions));
-    assert_eq!(found.primitives.len(), 1);
-    assert_eq!(found.primitives[0].id, 0);
+    let mut draw = draw_with(&device, programs(&[VertexOutput::PointSize]), state(Topology::PointList), &positions);
+    let sizes = [[4.0f32, 0.0, 0.0, 0.0]; 6];
+    draw.attributes.push(stream(&sizes, crate::Format::R32G32B32A32Sfloat));
+    let found = run(&device, &draw);
+    assert_eq!(found.primitives.iter().map(|primitive| primitive.id).collect::<Vec<_>>(), [0, 1, 2]);
 }
 
 #[gaurast_runner::test]
