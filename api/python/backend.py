@@ -54,7 +54,7 @@ class _Build:
         words = [word for package in packages for word in ("-p", package)]
         subprocess.run([*self._cargo, *words, *options], cwd=_ROOT, check=True)
 
-    def run_all(self) -> None:
+    def run_for_wheel(self) -> None:
         """Builds the driver, the layers, and the command without a driver of its own."""
         self.run(_LIBRARY_PACKAGES)
         self.run(["gaurast-cli"], "--no-default-features")
@@ -85,7 +85,8 @@ def _check_loader() -> None:
     """Refuses a Vulkan loader that older systems cannot load."""
     loader = os.environ.get("GAURAST_LOADER")
     if loader:
-        newest = max(int(minor) for minor in re.findall(rb"GLIBC_2\.(\d+)", Path(loader).read_bytes()))
+        versions = re.findall(rb"GLIBC_2\.(\d+)", Path(loader).read_bytes())
+        newest = max(map(int, versions), default=0)
         if newest > _GLIBC_OF_LOADER:
             sys.exit(f"gaurast: GAURAST_LOADER: {loader} needs glibc 2.{newest}, and the wheel's is to run with 2.{_GLIBC_OF_LOADER}")
 
@@ -142,7 +143,7 @@ def build_wheel(wheel_directory: str, config_settings: object = None, metadata_d
 
     _licences()
     build = _Build("build", [])
-    build.run_all()
+    build.run_for_wheel()
     collect(build.folder)
     name: str = maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
     return name
@@ -162,7 +163,7 @@ def release_wheel(folder: str) -> None:
     _check_loader()
     _licences()
     build = _Build("zigbuild", ["--target", f"{_TARGET}.{_GLIBC}"])
-    build.run_all()
+    build.run_for_wheel()
     collect(build.folder)
     build.run(["gaurast-cli"])
     command = ["maturin", "build", "--zig", "--locked", "--target", _TARGET, "--compatibility", "manylinux2014"]

@@ -101,6 +101,15 @@ node_packages() {
     touch "$environment/complete"
 }
 
+# rust_program NAME VERSION: builds programs/NAME, whose main package has the version; $program is the built file.
+rust_program() {
+    need cargo
+    program=$cache/$1-$2/release/$1-client
+    [ -e "$program" ] || may_install "$1-client"
+    CARGO_TARGET_DIR=$cache/$1-$2 cargo build --release --locked --quiet --manifest-path "$here/programs/$1/Cargo.toml" \
+        > "$out/$client-install.log" 2>&1 || ignored "cargo does not build it ($out/$client-install.log)"
+}
+
 # check VERSION PROGRAM ARGUMENT...: runs a program that checks its results and prints the figures in its last line.
 check() {
     version=$1

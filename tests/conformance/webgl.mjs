@@ -191,6 +191,8 @@ async function work() {
         await Promise.race([browser.close().catch(() => {}), new Promise((later) => setTimeout(later, 10_000))]);
     }
 }
+// Playwright closes the browsers when the process exits.
+process.once('SIGTERM', () => process.exit(143));
 await Promise.all(Array.from({ length: Number(options.jobs) }, work));
 server.close();
 

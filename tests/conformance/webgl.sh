@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs Khronos' WebGL conformance tests, as Chromium lists them for WebGL 2, in Chromium: its ANGLE draws by Vulkan on this driver.
+# Runs Khronos' WebGL conformance tests, those that the suite lists for WebGL 2, in Chromium: its ANGLE draws by Vulkan on this driver.
 #
 #   GAURAST_WEBGL=PATH/TO/WebGL/sdk/tests bash tests/conformance/webgl.sh [PATTERN...] [--angle vulkan|swiftshader] [--cases N]
 #       [--seed N] [--jobs N] [--results FILE] [--list]

@@ -241,7 +241,7 @@ const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
     vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw() | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
 );
 
-/// Whether an image of this usage may be an attachment.
+/// Reports whether an image of this usage may be an attachment.
 fn is_rendered_to(usage: vk::ImageUsageFlags) -> bool {
     let attachments = vk::ImageUsageFlags::COLOR_ATTACHMENT
         | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT

@@ -1,11 +1,14 @@
 //! vello: shapes of a scene cover as much of each pixel as their geometry says.
 
+#[path = "../../wgpu_device.rs"]
+mod wgpu_device;
+
 use std::error::Error;
 
 use vello::kurbo::{Affine, Circle, Point, Rect};
 use vello::peniko::color::palette::css;
 use vello::peniko::{Color, Fill, Gradient};
-use vello::{AaConfig, AaSupport, RenderParams, Renderer, RendererOptions, Scene, wgpu};
+use vello::{AaConfig, AaSupport, RenderParams, Renderer, RendererOptions, Scene};
 
 const SIZE: u32 = 256;
 const CENTRE: Point = Point::new(90.3, 120.6);
@@ -42,29 +45,11 @@ fn drawn(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Vec<[u8; 4]>, Box
         RenderParams { base_color: css::BLACK, width: SIZE, height: SIZE, antialiasing_method: AaConfig::Area };
     let view = texture.create_view(&Default::default());
     renderer.render_to_texture(device, queue, &scene(), &view, &parameters)?;
-    let read = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(4 * SIZE * SIZE),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&Default::default());
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * SIZE), rows_per_image: None };
-    let to = wgpu::TexelCopyBufferInfo { buffer: &read, layout };
-    encoder.copy_texture_to_buffer(texture.as_image_copy(), to, size);
-    queue.submit([encoder.finish()]);
-    read.map_async(wgpu::MapMode::Read, .., |mapped| mapped.expect("the buffer can be mapped"));
-    device.poll(wgpu::PollType::wait_indefinitely())?;
-    Ok(read.get_mapped_range(..)?.as_chunks::<4>().0.to_vec())
+    wgpu_device::pixels(device, queue, &texture, SIZE)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN;
-    descriptor.flags = wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER;
-    let instance = wgpu::Instance::new(descriptor);
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
-    let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
+    let (adapter, device, queue) = wgpu_device::open()?;
     let pixels = drawn(&device, &queue)?;
     let at = |x: u32, y: u32| pixels[(y * SIZE + x) as usize];
 

@@ -1,7 +1,11 @@
 //! wgpu: a compute shader's numbers are those of the processor, and a triangle covers the pixels that it must.
 
+#[path = "../../wgpu_device.rs"]
+mod wgpu_device;
+
 use std::error::Error;
 use wgpu::util::DeviceExt;
+use wgpu_device::{bytes_of, target};
 
 const COUNT: u32 = 100_000;
 const COLLATZ: &str = include_str!("../../collatz.wgsl");
@@ -17,24 +21,6 @@ fn steps(n: u32) -> u32 {
         steps += 1;
     }
     steps
-}
-
-/// The bytes of a buffer that can be mapped.
-fn bytes_of(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, Box<dyn Error>> {
-    buffer.map_async(wgpu::MapMode::Read, .., |mapped| {
-        mapped.expect("the buffer can be mapped")
-    });
-    device.poll(wgpu::PollType::wait_indefinitely())?;
-    Ok(buffer.get_mapped_range(..)?.to_vec())
-}
-
-fn target(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
 }
 
 /// The results of the compute shader.
@@ -122,7 +108,6 @@ fn drawn(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Vec<[u8; 4]>, Box
         multiview_mask: None,
         cache: None,
     });
-    let read = target(device, u64::from(4 * SIZE * SIZE));
     let view = texture.create_view(&Default::default());
     let mut encoder = device.create_command_encoder(&Default::default());
     {
@@ -141,30 +126,13 @@ fn drawn(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Vec<[u8; 4]>, Box
         pass.set_pipeline(&pipeline);
         pass.draw(0..3, 0..1);
     }
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &read,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(4 * SIZE),
-                rows_per_image: None,
-            },
-        },
-        size,
-    );
     queue.submit([encoder.finish()]);
-    Ok(bytes_of(device, &read)?.as_chunks::<4>().0.to_vec())
+    wgpu_device::pixels(device, queue, &texture, SIZE)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    descriptor.backends = wgpu::Backends::VULKAN;
-    descriptor.flags = wgpu::InstanceFlags::ALLOW_UNDERLYING_NONCOMPLIANT_ADAPTER;
-    let instance = wgpu::Instance::new(descriptor);
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
     // The default limits are asked for.
-    let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
+    let (adapter, device, queue) = wgpu_device::open()?;
 
     let numbers = computed(&device, &queue)?;
     let differ = (1..=COUNT)
