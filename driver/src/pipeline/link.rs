@@ -10,6 +10,7 @@ use super::link_primitives::{
     self, Given, TessellationShaders, carry_written, components_written, given, gives_memory, output_given,
 };
 use super::varyings::{InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs};
+use ash::vk;
 use gaurast_spirv::{
     BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling, Shader,
 };
@@ -98,6 +99,26 @@ pub(crate) fn link_projection(
     }
 }
 
+/// Replaces the locations of colours by their attachments. `color_locations` has the location of each attachment; it is empty if each
+/// attachment's is its number. Alpha to coverage takes the alpha of location 0, wherever that goes.
+pub(super) fn place_outputs(fragment: &mut Shader, color_locations: &[u32]) {
+    if color_locations.is_empty() {
+        return;
+    }
+    if color_locations[0] != 0 {
+        let alpha = OutputTarget::Location { location: 0, component: 3, index: 0 };
+        carry(fragment, alpha, InterfaceComponent { location: LOCATION_OF_COVERAGE, component: 3 });
+    }
+    for output in &mut fragment.interface.outputs {
+        if let OutputTarget::Location { location, .. } = &mut output.target
+            && *location != LOCATION_OF_COVERAGE
+        {
+            let attachment = color_locations.iter().position(|of_attachment| *of_attachment == *location);
+            *location = attachment.map_or(vk::ATTACHMENT_UNUSED, |attachment| attachment as u32);
+        }
+    }
+}
+
 /// Links a fragment program that computes colours from the accumulated values of Gaussians. `varyings` gives their
 /// numbers.
 pub(crate) fn link_resolve(fragment: Shader, varyings: &Varyings, live_outputs: LiveOutputs<'_>) -> FragmentPrograms {
@@ -153,6 +174,9 @@ fn fragment_programs(fragment: Shader, varyings: &Varyings, live_outputs: LiveOu
 
 /// The location, which no application can use, for outputs that are captured, each of which is a component.
 const LOCATION_OF_CAPTURED: u32 = u32::MAX - 2;
+
+/// The location, which no application can use, for the alpha of alpha to coverage.
+const LOCATION_OF_COVERAGE: u32 = u32::MAX - 3;
 
 /// The location, which no application can use, for a distance that is passed on as a varying.
 fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
@@ -312,6 +336,9 @@ fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<Fra
 
 fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<FragmentOutput> {
     match output.target {
+        OutputTarget::Location { location: LOCATION_OF_COVERAGE, .. } => {
+            live_outputs.coverage_alpha.then_some(FragmentOutput::CoverageAlpha)
+        }
         OutputTarget::Location { location, component, index } => {
             let has_effect =
                 live_outputs.color.get(location as usize) == Some(&true) && (index == 0 || live_outputs.second_source);

@@ -6,7 +6,9 @@ use super::link::{self, StageShaders};
 use super::link_primitives::{self, TessellationShaders};
 use super::parts::GraphicsState;
 use super::stages::{self, ProgramResources};
-use super::state::{self, AttributeSource, Class, FixedFunctionState, live_color_outputs, reads_second_source};
+use super::state::{
+    self, AttributeSource, Class, FixedFunctionState, live_color_outputs, reads_second_source, uses_coverage_alpha,
+};
 use super::varyings::LiveOutputs;
 use crate::abi::error::Error;
 use crate::device::Device;
@@ -78,7 +80,7 @@ impl PrimitivePipeline {
         let stages = Stages::find(device, graphics)?;
         let mut shaders = stages.translate(device, layout, fixed.draw.samples)?;
         if let Some(fragment) = &mut shaders.fragment {
-            stages::place_outputs(fragment, &graphics.fragment_output.color_locations);
+            link::place_outputs(fragment, &graphics.fragment_output.color_locations);
         }
         link_primitives::check(
             shaders.tessellation.as_ref(),
@@ -105,6 +107,7 @@ impl PrimitivePipeline {
         let color = live_color_outputs(graphics, &fixed);
         let live_outputs = LiveOutputs {
             color: &color,
+            coverage_alpha: uses_coverage_alpha(graphics, &fixed),
             second_source: graphics.fragment_output.blend.iter().any(reads_second_source)
                 || graphics.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
             points: state::class(fixed.draw.topology) == Class::Points

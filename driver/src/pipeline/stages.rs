@@ -12,7 +12,7 @@ use crate::device_addresses::Addresses;
 use crate::physical_device::limits;
 use crate::shader_module::ShaderStage;
 use ash::vk;
-use gaurast_spirv::{Interface, Options, OutputTarget, ScalarType, Shader, ShaderBinding, Stage};
+use gaurast_spirv::{Interface, Options, ScalarType, Shader, ShaderBinding, Stage};
 use simdevice::Format;
 use simdevice::format::Numeric;
 use std::sync::Arc;
@@ -141,20 +141,6 @@ fn class(ty: ScalarType) -> (u8, bool) {
         ScalarType::Int { width } => (1, width == 64),
         ScalarType::Uint { width } => (2, width == 64),
         ScalarType::Bool => (2, false),
-    }
-}
-
-/// Gives the outputs at the locations of colour attachments the attachments' numbers; outputs at other locations go
-/// nowhere.
-pub(super) fn place_outputs(fragment: &mut Shader, color_locations: &[u32]) {
-    if color_locations.is_empty() {
-        return;
-    }
-    for output in &mut fragment.interface.outputs {
-        if let OutputTarget::Location { location, .. } = &mut output.target {
-            let attachment = color_locations.iter().position(|of_attachment| *of_attachment == *location);
-            *location = attachment.map_or(vk::ATTACHMENT_UNUSED, |attachment| attachment as u32);
-        }
     }
 }
 

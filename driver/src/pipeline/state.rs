@@ -737,6 +737,11 @@ fn require_all(needs: &[FeatureNeed]) -> Result<(), Error> {
     }
 }
 
+/// True if alpha may determine coverage.
+pub(crate) fn uses_coverage_alpha(graphics: &GraphicsState, fixed: &FixedFunctionState) -> bool {
+    fixed.draw.alpha_to_coverage || graphics.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT)
+}
+
 /// True for each colour attachment whose source has an effect.
 pub(crate) fn live_color_outputs(graphics: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
     // Dynamic state may be enabled.
@@ -744,7 +749,7 @@ pub(crate) fn live_color_outputs(graphics: &GraphicsState, fixed: &FixedFunction
     let mut live_outputs: Vec<_> = std::iter::zip(&fixed.attachments, &graphics.fragment_output.color_formats)
         .map(|(attachment, format)| (any_mask || attachment.write_mask != 0) && *format != vk::Format::UNDEFINED)
         .collect();
-    if fixed.draw.alpha_to_coverage || graphics.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT) {
+    if uses_coverage_alpha(graphics, fixed) {
         match live_outputs.first_mut() {
             Some(first) => *first = true,
             None => live_outputs.push(true),

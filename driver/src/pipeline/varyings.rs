@@ -10,6 +10,8 @@ use std::collections::HashMap;
 pub(crate) struct LiveOutputs<'a> {
     /// True for each colour attachment that is written, or whose source's alpha is used.
     pub(crate) color: &'a [bool],
+    /// True if alpha may determine coverage.
+    pub(crate) coverage_alpha: bool,
     /// True if the second source of blending is read.
     pub(crate) second_source: bool,
     /// True if points are drawn, so that the point size is used.

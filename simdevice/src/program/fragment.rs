@@ -32,6 +32,8 @@ pub(crate) struct Interface {
     pub varyings: Vec<(u32, Interpolation)>,
     /// The output slots, by colour attachment.
     pub colors: Vec<ColorSlots>,
+    /// The output slot of the alpha of alpha to coverage.
+    pub coverage_alpha: Option<u32>,
     pub depth: Option<u32>,
     pub sample_mask: Option<u32>,
     pub stencil_reference: Option<u32>,
@@ -138,11 +140,14 @@ impl Interface {
                         *slot = Some(output.slot);
                     }
                 }
+                FragmentOutput::CoverageAlpha => interface.coverage_alpha = Some(output.slot),
                 FragmentOutput::Depth => interface.depth = Some(output.slot),
                 FragmentOutput::SampleMask => interface.sample_mask = Some(output.slot),
                 FragmentOutput::StencilReference => interface.stencil_reference = Some(output.slot),
             }
         }
+        let alpha_of_first = interface.colors.first().and_then(|[first, _]| first[3]);
+        interface.coverage_alpha = interface.coverage_alpha.or(alpha_of_first);
         interface
     }
 }

@@ -329,6 +329,8 @@ pub enum FragmentOutput {
         /// The source: 0, or 1 for the second source of dual-source blending.
         index: usize,
     },
+    /// The alpha of alpha to coverage, where it is not attachment 0's.
+    CoverageAlpha,
     /// The depth.
     Depth,
     /// The mask of samples to keep.

@@ -38,8 +38,17 @@ impl Attachments for Two {
     }
 }
 
-/// A pipeline over all pixels whose colour attachments take the outputs at these locations.
-fn pipeline(gpu: &Gpu, fragment: &str, layout: vk::PipelineLayout, locations: [u32; 2]) -> vk::Pipeline {
+/// A pipeline over all pixels.
+struct Placed<'a> {
+    fragment: &'a str,
+    layout: vk::PipelineLayout,
+    /// The location of the output that each colour attachment takes.
+    locations: [u32; 2],
+    alpha_to_coverage: bool,
+}
+
+fn pipeline(gpu: &Gpu, placed: &Placed<'_>) -> vk::Pipeline {
+    let &Placed { fragment, layout, locations, alpha_to_coverage } = placed;
     let device = gpu.device();
     let vertex = "void main() {
         gl_Position = vec4(4.0 * (gl_VertexIndex & 1) - 1.0, 4.0 * (gl_VertexIndex >> 1) - 1.0, 0.0, 1.0);
@@ -66,8 +75,9 @@ fn pipeline(gpu: &Gpu, fragment: &str, layout: vk::PipelineLayout, locations: [u
         let scissors = [area];
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewports(&viewports).scissors(&scissors);
         let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let multisample =
-            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::TYPE_1)
+            .alpha_to_coverage_enable(alpha_to_coverage);
         let attachments = [gaurast_testkit::pipeline::opaque(); 2];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let formats = [COLOR; 2];
@@ -117,7 +127,8 @@ fn a_draw_reads_what_another_wrote_to_its_pixel() {
         layout(location = 1) out vec4 nowhere;
         void main() { color = 2.0 * subpassLoad(before) + vec4(1.0); nowhere = vec4(200.0); }";
     let locations = [[1, UNUSED], [UNUSED, 0]];
-    let pipelines = [pipeline(&gpu, writes, layout, locations[0]), pipeline(&gpu, reads, layout, locations[1])];
+    let pipelines = [(writes, locations[0]), (reads, locations[1])]
+        .map(|(fragment, locations)| pipeline(&gpu, &Placed { fragment, layout, locations, alpha_to_coverage: false }));
     gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([7.0; 4]), || {
             let (_, raw) = commands.raw();
@@ -160,4 +171,54 @@ fn a_draw_reads_what_another_wrote_to_its_pixel() {
         pipelines.into_iter().for_each(|pipeline| device.destroy_pipeline(pipeline, None));
         device.destroy_pipeline_layout(layout, None);
     }
+}
+
+/// Alpha to coverage takes the alpha of location 0, to whichever attachment that goes.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn the_alpha_of_location_zero_is_the_coverage() {
+    let mut features =
+        vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR::default().dynamic_rendering_local_read(true);
+    let gpu = Gpu::extended(&[ash::khr::dynamic_rendering_local_read::NAME], &mut features).expect("a device");
+    let device = gpu.device();
+    let local = ash::khr::dynamic_rendering_local_read::Device::new(gpu.instance(), device);
+    let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT;
+    let target = Two([(); 2].map(|()| Image::new(&gpu, &ImageOptions::new(COLOR, [SIDE; 2], usage))));
+    // SAFETY: see the crate.
+    let layout = unsafe { device.create_pipeline_layout(&Default::default(), None) }.expect("a layout");
+    let fragment = "
+        layout(location = 0) out vec4 zero;
+        layout(location = 1) out vec4 one;
+        void main() {
+            bool left = gl_FragCoord.x < 8.0;
+            zero = vec4(1.0, 2.0, 3.0, left ? 1.0 : 0.0);
+            one = vec4(4.0, 5.0, 6.0, left ? 0.0 : 1.0);
+        }";
+    const UNUSED: u32 = vk::ATTACHMENT_UNUSED;
+    let outputs = [[1.0, 2.0, 3.0, 1.0], [4.0, 5.0, 6.0, 0.0f32]];
+    for locations in [[0, 1], [1, 0], [1, UNUSED], [UNUSED, 0], [UNUSED, UNUSED]] {
+        let pipeline = pipeline(&gpu, &Placed { fragment, layout, locations, alpha_to_coverage: true });
+        gpu.run(|commands| {
+            commands.pass(&target, &Pass::clear([7.0; 4]), || {
+                let (_, raw) = commands.raw();
+                let placed = vk::RenderingAttachmentLocationInfoKHR::default().color_attachment_locations(&locations);
+                // SAFETY: see the crate.
+                unsafe {
+                    local.cmd_set_rendering_attachment_locations(raw, &placed);
+                    device.cmd_bind_pipeline(raw, vk::PipelineBindPoint::GRAPHICS, pipeline);
+                    device.cmd_draw(raw, 3, 1, 0, 0);
+                }
+            });
+        });
+        for (image, location) in target.0.iter().zip(locations) {
+            for (place, color) in (0..).zip(image.colors::<[f32; 4]>()) {
+                let output = outputs.get(location as usize).filter(|_| place % SIDE < 8);
+                assert_eq!(color, output.copied().unwrap_or([7.0; 4]), "{locations:?}: pixel {place}");
+            }
+        }
+        // SAFETY: see the crate.
+        unsafe { device.destroy_pipeline(pipeline, None) };
+    }
+    assert_eq!(gpu.message_texts(), [""; 0]);
+    // SAFETY: see the crate.
+    unsafe { device.destroy_pipeline_layout(layout, None) };
 }

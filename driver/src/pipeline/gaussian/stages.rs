@@ -6,7 +6,9 @@ use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link;
 use crate::pipeline::parts::GraphicsState;
 use crate::pipeline::stages::{self, ProgramResources};
-use crate::pipeline::state::{AttributeSource, FixedFunctionState, live_color_outputs, reads_second_source};
+use crate::pipeline::state::{
+    AttributeSource, FixedFunctionState, live_color_outputs, reads_second_source, uses_coverage_alpha,
+};
 use crate::pipeline::varyings::{InterfaceComponent, LiveOutputs, Varyings};
 use crate::shader_module::ShaderStage;
 use ash::vk;
@@ -94,13 +96,14 @@ impl ResolveStage {
             return is_needed.then(|| Self::passing(device, fixed)).transpose();
         };
         let mut fragment = stages::translate(device, layout(graphics)?, stage, Stage::Fragment, draw.samples)?;
-        stages::place_outputs(&mut fragment, &graphics.fragment_output.color_locations);
+        link::place_outputs(&mut fragment, &graphics.fragment_output.color_locations);
         let varyings = varyings(state)?;
         check_resolve(&fragment.interface, &varyings)?;
         let resources = ProgramResources::new(device, &fragment.interface);
         let color = live_color_outputs(graphics, fixed);
         let live_outputs = LiveOutputs {
             color: &color,
+            coverage_alpha: uses_coverage_alpha(graphics, fixed),
             second_source: graphics.fragment_output.blend.iter().any(reads_second_source),
             points: false,
             views: graphics.pre_rasterization.view_mask != 0,

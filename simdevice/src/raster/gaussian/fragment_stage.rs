@@ -340,8 +340,7 @@ impl<'a> FragmentStageDraw<'a> {
         let sources: Vec<Sources<'_>> =
             interface.colors.iter().map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)))).collect();
         let masks = lanes_of(machine, interface.sample_mask);
-        let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
-        let alpha = lanes_of(machine, alpha.filter(|_| self.gaussian_stage.alpha_to_coverage));
+        let alpha = lanes_of(machine, interface.coverage_alpha.filter(|_| self.gaussian_stage.alpha_to_coverage));
         for (number, &block) in group.blocks.iter().enumerate() {
             let killed = killed.words().get(number / 4).copied().unwrap_or(0) >> (16 * (number % 4));
             let by_alpha = match alpha.get(number) {

@@ -249,13 +249,11 @@ fn remove<S: Simd>(
             }
         }
     }
-    if draw.draw.state.alpha_to_coverage {
-        let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
-        if let Some(alpha) = alpha.and_then(|slot| machine.output_vectors(slot).get(chunk)) {
-            let covered = covered_by_alpha(simd, alpha, draw.samples.positions.len());
-            for (lanes, covered) in samples.iter_mut().zip(covered) {
-                *lanes &= covered;
-            }
+    let coverage_alpha = interface.coverage_alpha.filter(|_| draw.draw.state.alpha_to_coverage);
+    if let Some(alpha) = coverage_alpha.and_then(|slot| machine.output_vectors(slot).get(chunk)) {
+        let covered = covered_by_alpha(simd, alpha, draw.samples.positions.len());
+        for (lanes, covered) in samples.iter_mut().zip(covered) {
+            *lanes &= covered;
         }
     }
 }
