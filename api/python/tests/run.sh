@@ -2,7 +2,7 @@
 # Runs the Python package's tests on built files: run.sh BUILD, such as target/checked.
 #
 # The package is laid out in a folder of its own, as a wheel would be. With GAURAST_TEST_LONG=1, the tests also take programs with
-# mujoco and wgpu from PyPI, jax's arrays, and more draws.
+# mujoco and wgpu from PyPI, jax's and torch's arrays, and more draws. torch and its libraries take 6 GB.
 set -euo pipefail
 build=$(realpath "$1")
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -12,7 +12,7 @@ python=${PYTHON:-python3}
 "$python" -m venv "$work/venv"
 packages=(numpy pytest mypy)
 if [ -n "${GAURAST_TEST_DATA:-}" ]; then packages+=(OpenEXR); fi
-if [ -n "${GAURAST_TEST_LONG:-}" ]; then packages+=(mujoco wgpu jax); fi
+if [ -n "${GAURAST_TEST_LONG:-}" ]; then packages+=(mujoco wgpu jax torch); fi
 if ! "$work/venv/bin/pip" install --quiet "${packages[@]}"; then
     echo "SKIPPED [1] api/python: ${packages[*]} can't be had"
     [ -z "${GAURAST_TEST_REQUIRE:-}" ]
