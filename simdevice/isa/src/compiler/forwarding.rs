@@ -38,7 +38,7 @@ fn returns(statement: &Statement) -> bool {
 }
 
 /// The number of statements that assign to a variable.
-fn assignments(block: &Block, variable: Reg) -> usize {
+pub(super) fn assignments(block: &Block, variable: Reg) -> usize {
     let of = |statement: &Statement| {
         let own = usize::from(statement.definitions().contains(&variable));
         let inner = statement.blocks().into_iter();

@@ -6,89 +6,10 @@ use crate::ir::{Address, Block, Format, Program, Reg, Register, Role, Space, Sta
 
 /// Moves loop-invariant computations out of loops, and shares repeated loads.
 pub fn move_invariants(program: &mut Program) {
-    load_push_constants_first(program);
     let mut sharing = Sharing { registers: &program.registers, alias: HashMap::new() };
     sharing.block(&mut program.body);
     let moving = Moving { registers: &program.registers, loads: !program.may_wait() };
     moving.out_of_loops(&mut program.body);
-}
-
-/// Loads each push constant at a constant offset once, at the beginning: a program can't write them.
-fn load_push_constants_first(program: &mut Program) {
-    let mut pushed = Pushed {
-        known: program.constants.iter().map(|constant| (constant.reg, constant.bits)).collect(),
-        registers: &mut program.registers,
-        loaded: HashMap::new(),
-        alias: HashMap::new(),
-        loads: Vec::new(),
-    };
-    pushed.block(&mut program.body);
-    let loads = pushed.loads;
-    program.body.splice(0..0, loads);
-}
-
-struct Pushed<'a> {
-    known: HashMap<Reg, u64>,
-    registers: &'a mut Vec<Register>,
-    loaded: HashMap<(u32, Format), Reg>,
-    alias: HashMap<Reg, Reg>,
-    loads: Vec<Statement>,
-}
-
-impl Pushed<'_> {
-    fn block(&mut self, block: &mut Block) {
-        block.retain_mut(|statement| {
-            replace_uses(statement, &self.alias);
-            if let Statement::Load { dst, address, format } = statement
-                && let Some(start) = self.start(address)
-                && let Some(end) = start.checked_add(format.bytes() * dst.len() as u32)
-            {
-                let places = (start..end).step_by(format.bytes() as usize);
-                for (reg, place) in dst.iter().zip(places) {
-                    let same = self.load(place, *format);
-                    self.alias.insert(*reg, same);
-                }
-                return false;
-            }
-            for inner in statement.blocks_mut() {
-                self.block(inner);
-            }
-            true
-        });
-    }
-
-    /// The constant offset of an access to push constants, if it has one.
-    fn start(&self, address: &Address) -> Option<u32> {
-        if address.space != Space::PushConstants {
-            return None;
-        }
-        let base = match address.base {
-            Some(base) => *self.known.get(&base)?,
-            None => 0,
-        };
-        u32::try_from(base).ok()?.checked_add(address.offset)
-    }
-
-    fn load(&mut self, place: u32, format: Format) -> Reg {
-        *self.loaded.entry((place, format)).or_insert_with(|| {
-            let reg = Reg(self.registers.len() as u32);
-            self.registers.push(Register { ty: format.register_type(), role: Role::Value });
-            self.loads.push(Statement::Load {
-                dst: vec![reg],
-                address: Address { space: Space::PushConstants, base: None, offset: place },
-                format,
-            });
-            reg
-        })
-    }
-}
-
-fn replace_uses(statement: &mut Statement, alias: &HashMap<Reg, Reg>) {
-    statement.for_each_use(&mut |reg| {
-        if let Some(same) = alias.get(reg) {
-            *reg = *same;
-        }
-    });
 }
 
 /// Finds loads that an earlier load in the same block has done, with no write to memory in between.
@@ -101,7 +22,7 @@ impl Sharing<'_> {
     fn block(&mut self, block: &mut Block) {
         let mut loaded: Vec<(Address, Format, Vec<Reg>)> = Vec::new();
         block.retain_mut(|statement| {
-            replace_uses(statement, &self.alias);
+            statement.replace_uses(&self.alias);
             for inner in statement.blocks_mut() {
                 self.block(inner);
             }
@@ -154,9 +75,7 @@ impl Moving<'_> {
             }
             if let Statement::Loop { .. } = statement {
                 let mut defined = HashSet::new();
-                for inner in statement.blocks() {
-                    collect_definitions(inner, &mut defined);
-                }
+                statement.collect_definitions(&mut defined);
                 let loads = self.loads && !statement.blocks().into_iter().any(writes_buffers);
                 for inner in statement.blocks_mut() {
                     self.take_invariant(inner, loads, &mut defined, block);
@@ -200,15 +119,6 @@ fn writes_buffers(block: &Block) -> bool {
         Statement::ImageWrite(_) | Statement::ImageAtomic(_) => true,
         _ => statement.blocks().into_iter().any(writes_buffers),
     })
-}
-
-fn collect_definitions(block: &Block, defined: &mut HashSet<Reg>) {
-    for statement in block {
-        defined.extend(statement.definitions());
-        for inner in statement.blocks() {
-            collect_definitions(inner, defined);
-        }
-    }
 }
 
 #[cfg(test)]

@@ -8,10 +8,13 @@ mod forwarding;
 mod if_conversion;
 mod licm;
 mod linearize;
+mod propagation;
+mod push_constants;
 mod scopes;
 mod sink;
 pub mod step;
 mod uniformity;
+mod unroll;
 
 use std::sync::atomic::AtomicU32;
 
@@ -115,13 +118,19 @@ impl CompiledProgram {
             }
         }
         validate(&program)?;
-        fold::fold(&mut program);
+        fold::fold(&mut program, None);
         dead_code::remove_dead(&mut program);
+        let table = constant_table::promote_constants(&mut program);
+        push_constants::load_once(&mut program);
+        if unroll::unroll(&mut program) {
+            propagation::propagate(&mut program);
+            fold::fold(&mut program, table.as_deref());
+            dead_code::remove_dead(&mut program);
+        }
         if_conversion::convert_branches(&mut program);
         licm::move_invariants(&mut program);
         dead_code::remove_dead(&mut program);
         sink::sink(&mut program);
-        let table = constant_table::promote_constants(&mut program);
         let same = SameInAllLanes { private: table.is_some(), shared: workgroup == lanes };
         let varying = uniformity::varying_registers(&program, same);
         forwarding::forward(&mut program, &varying);

@@ -1,5 +1,6 @@
 //! Statements: their effects, the registers that they define and use, and their text.
 
+use std::collections::{HashMap, HashSet};
 use std::fmt::{Display, Formatter, Result};
 
 use super::image::{ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Sample};
@@ -430,6 +431,17 @@ impl Statement {
         let mut found = Vec::new();
         self.clone_head().for_each_use(&mut |reg| found.push(*reg));
         found
+    }
+
+    /// Adds the registers that the statement, and those within, define or assign.
+    pub fn collect_definitions(&self, found: &mut HashSet<Reg>) {
+        found.extend(self.definitions());
+        self.blocks().into_iter().flatten().for_each(|inner| inner.collect_definitions(found));
+    }
+
+    /// Replaces the registers that the statement itself reads by others.
+    pub fn replace_uses(&mut self, by: &HashMap<Reg, Reg>) {
+        self.for_each_use(&mut |reg| *reg = by.get(reg).copied().unwrap_or(*reg));
     }
 
     /// The blocks within, in order of execution.

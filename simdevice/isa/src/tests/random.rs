@@ -332,31 +332,45 @@ impl Grower {
         self.b.end();
     }
 
-    /// Generates a loop that ends after a few iterations, even if its body continues early.
+    /// Generates a loop that ends after a few iterations, even if its body continues early. The number of iterations may be
+    /// a constant.
     fn repeat(&mut self, depth: usize) {
         let scope = self.enter();
         let count = self.b.variable(Type::B32);
         let (zero, one, most) = (self.b.u32(0), self.b.u32(1), self.b.u32(4));
-        let limit = self.integer();
-        let limit = self.b.compute(Op::URem, &[limit, most]);
+        let is_constant = self.random.once_in(2);
+        let limit = match is_constant {
+            true => self.b.u32(self.random.below(5) as u32),
+            false => {
+                let limit = self.integer();
+                self.b.compute(Op::URem, &[limit, most])
+            }
+        };
         self.b.assign(count, zero);
         let label = self.b.begin_loop();
         // Values of the last iteration that a lane was in may be read after the loop.
         let source = self.integer();
         let escaping = self.b.compute(Op::IAdd, &[source, count]);
         let enough = self.b.compute(Op::ULe, &[limit, count]);
-        let next = self.b.compute(Op::IAdd, &[count, one]);
-        self.b.assign(count, next);
+        if !is_constant {
+            let next = self.b.compute(Op::IAdd, &[count, one]);
+            self.b.assign(count, next);
+        }
         self.b.begin_if(enough);
         self.b.break_to(label);
         self.b.end();
         self.loops.push(label);
         self.breakable.push(label);
+        self.integers.push(count);
         self.block(depth + 1);
         self.loops.pop();
-        if self.random.once_in(2) {
+        if is_constant || self.random.once_in(2) {
             self.b.begin_continuing();
             self.block_without_exits();
+            if is_constant {
+                let next = self.b.compute(Op::IAdd, &[count, one]);
+                self.b.assign(count, next);
+            }
             if self.random.once_in(2) {
                 let condition = self.condition();
                 self.b.begin_if(condition);
@@ -368,6 +382,7 @@ impl Grower {
         self.b.end();
         self.leave(&scope);
         self.integers.push(escaping);
+        self.integers.push(count);
     }
 
     fn block_without_exits(&mut self) {
