@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use isa::ir::{Axis, Reg};
 use isa::op::Op as Ir;
-use spirv::{GlslStd450Op as G, Op};
+use spirv::{Capability, GlslStd450Op as G, Op};
 
 use super::emitter::op_for_width;
 use super::translator::Translator;
@@ -582,6 +582,10 @@ fn wide_bit_field(
 
 /// Translates an extended instruction of GLSL.std.450 that works component by component.
 pub fn glsl_elementwise(t: &mut Translator, instruction: &Instruction, op: G) -> Result<()> {
+    let is_extreme = matches!(op, G::FMin | G::NMin | G::FMax | G::NMax);
+    if is_extreme && t.module.declares(Capability::FloatControls2) {
+        return glsl_each(t, instruction, 2, |t, scalar, src| extreme_of_signed(t, scalar, op, src));
+    }
     if let Some(row) = Elementwise::of_glsl(op) {
         return row.apply(t, instruction, 2);
     }
@@ -620,6 +624,22 @@ fn glsl_each(
         let reg = function(t, scalars[0], src);
         t.emit.wrap_to_width(scalars[0], reg)
     })
+}
+
+/// The minimum or maximum of two numbers, where -0 is less than 0: modules that say which operations may ignore the sign of zeros
+/// expect it of the others.
+fn extreme_of_signed(t: &mut Translator, scalar: Scalar, op: G, src: &[Reg]) -> Reg {
+    let (extreme, of_equal) = match (op, scalar.is_wide()) {
+        (G::FMin | G::NMin, false) => (Ir::FMin, Ir::Or),
+        (G::FMin | G::NMin, true) => (Ir::FMin64, Ir::Or64),
+        (_, false) => (Ir::FMax, Ir::And),
+        (_, true) => (Ir::FMax64, Ir::And64),
+    };
+    let extreme = t.emit.op(extreme, src);
+    // The bits of equal numbers are the same, but for zeros.
+    let is_equal = t.emit.op(op_for_width(scalar, Ir::FEq, Ir::FEq64), src);
+    let of_equal = t.emit.op(of_equal, src);
+    t.emit.select(is_equal, of_equal, extreme)
 }
 
 fn clamp_integers(t: &mut Translator, instruction: &Instruction, extension: Extension) -> Result<()> {

@@ -84,13 +84,16 @@ fn split_float(t: &mut Translator, instruction: &Instruction, op: G) -> Result<(
         if matches!(op, G::Modf | G::ModfStruct) {
             let whole = t.emit.op(op_for_width(scalar, Ir::FTrunc, Ir::FTrunc64), &[*x]);
             let fraction = t.emit.minus(scalar, *x, whole);
-            // Zero has the sign of x; an infinity has no fraction.
+            // Zero has the sign of x, also as the fraction of an infinity.
             let zero = t.emit.float(scalar, 0.0);
             let is_zero = t.emit.op(op_for_width(scalar, Ir::FEq, Ir::FEq64), &[fraction, zero]);
             let signed = t.emit.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[whole, zero]);
             let fraction = t.emit.select(is_zero, signed, fraction);
             let infinite = t.emit.op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
-            first.push(t.emit.select(infinite, zero, fraction));
+            let negative_zero = t.emit.float(scalar, -0.0);
+            let is_negative = t.emit.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[*x, zero]);
+            let of_infinite = t.emit.select(is_negative, negative_zero, zero);
+            first.push(t.emit.select(infinite, of_infinite, fraction));
             second.push(whole);
         } else {
             let significand = op_for_width(scalar, Ir::FFrexpSignificand, Ir::FFrexpSignificand64);
