@@ -281,13 +281,18 @@ fn primitives_go_to_their_viewport_and_layer() {
 }
 
 #[gaurast_runner::test]
-fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
+fn a_dynamic_state_that_was_not_set_is_the_pipelines() {
     let canvas = Canvas::new();
     let request = colored().with_dynamic(vk::DynamicState::CULL_MODE);
     let pixels = canvas.draw_vertices(&request, &everything(RED));
-    assert_eq!(count(&pixels, CLEAR), PIXELS);
+    assert_eq!(count(&pixels, RED), PIXELS);
     let told = canvas.gpu.message_texts().concat();
-    assert!(told.contains("CULL_MODE"), "{told}");
+    assert!(told.contains("CULL_MODE is dynamic and was not set"), "{told}");
+}
+
+#[gaurast_runner::test]
+fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
+    let canvas = Canvas::new();
     let mut request = colored();
     request.attributes[1].binding = 3;
     request.bindings.push(vk::VertexInputBindingDescription { binding: 3, ..request.bindings[0] });

@@ -4,6 +4,7 @@
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
 use crate::command::{DrawParameters, IndexBuffer};
+use crate::options;
 use crate::physical_device::limits::MAX_GAUSSIANS;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
@@ -222,7 +223,12 @@ fn draw_state(state: &mut State, primitives: &PrimitivePipeline) -> Result<Arc<D
         return Ok(Arc::clone(fixed));
     }
     let mut fixed = primitives.fixed.clone();
-    state.dynamic_states.apply(&primitives.dynamic, &mut fixed).map_err(DrawError::Dynamic)?;
+    if let Err(unset) = state.dynamic_states.apply(&primitives.dynamic, &mut fixed) {
+        if options::is_strict().unwrap_or(false) {
+            return Err(DrawError::Dynamic(unset));
+        }
+        state.unset = Some(unset);
+    }
     if !fixed.draw.rasterizer_discard {
         if let Some(count) = dynamic_count(primitives.viewports, state.viewport_count) {
             fixed.draw.viewports = set(&state.viewports, count).ok_or(DrawError::Viewport)?;

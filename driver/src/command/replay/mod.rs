@@ -236,6 +236,11 @@ fn draw(
             if let Some(sentence) = gaussian::beyond_buffers(&packets) {
                 execution.report(&sentence);
             }
+            if let Some(unset) = state.unset.take() {
+                execution.report(&format!(
+                    "the pipeline's {unset:?} is dynamic and was not set: the draw takes its default"
+                ));
+            }
             packets.iter().try_for_each(|packet| execution.execute(packet))
         }
         Err(reason) => {

@@ -9,6 +9,7 @@ use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::GaussianPipeline;
 use crate::pipeline::parts::VertexInput;
+use ash::vk;
 use simdevice::packet::GaussianBegin;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
@@ -46,6 +47,8 @@ pub(crate) struct State {
     pub(crate) dynamic_states: DynamicStates,
     /// The fixed-function state of the last draw, unless something in it has changed since.
     pub(crate) draw_state: Option<Arc<DrawState>>,
+    /// A dynamic state that the pipeline has and that was not set for a draw.
+    pub(crate) unset: Option<vk::DynamicState>,
     /// The cameras of Gaussian draws, one for all views or one for each, if they were set. Binding another pipeline
     /// keeps them.
     pub(crate) cameras: Box<[Camera]>,
