@@ -281,7 +281,7 @@ fn primitives_go_to_their_viewport_and_layer() {
 }
 
 #[gaurast_runner::test]
-fn a_dynamic_state_that_was_not_set_is_the_pipelines() {
+fn a_dynamic_state_that_was_not_set_has_a_default() {
     let canvas = Canvas::new();
     let request = colored().with_dynamic(vk::DynamicState::CULL_MODE);
     let pixels = canvas.draw_vertices(&request, &everything(RED));

@@ -1,7 +1,7 @@
 //! Tests of shaders on the shader cores, most of them in SPIR-V assembly because GLSL can't express them. Each row of
 //! results is compared with the host's.
 
-use crate::common::{Dispatch, Random, buffer, contents, rewritten, translated, words_of};
+use crate::common::{Dispatch, Random, buffer, contents, floats, rewritten, translated, words_of};
 use devmem::BufferRange;
 use gaurast_spirv::{Module, Specialization};
 
@@ -386,6 +386,12 @@ fn dot_products_of_integers() {
     }
 }
 
+/// A module's words with one more declaration of a capability.
+fn with(words: &[u32], capability: spirv::Capability) -> Vec<u32> {
+    let (header, rest) = words.split_at(5);
+    [header, &[2 << 16 | spirv::Op::Capability as u32, capability as u32], rest].concat()
+}
+
 /// A module's words without the declarations of a capability.
 fn without(words: &[u32], capability: spirv::Capability) -> Vec<u32> {
     let declaration = [2 << 16 | spirv::Op::Capability as u32, capability as u32];
@@ -432,10 +438,7 @@ fn capabilities_that_need_no_feature_are_accepted() {
         C::DeviceGroup,
         C::ShaderNonUniform,
     ] {
-        let mut declaring = words[..5].to_vec();
-        declaring.extend([2 << 16 | spirv::Op::Capability as u32, capability as u32]);
-        declaring.extend_from_slice(&words[5..]);
-        let module = Module::parse(&declaring).unwrap();
+        let module = Module::parse(&with(&words, capability)).unwrap();
         let translated = gaurast_spirv::translate(
             &module,
             "main",
@@ -471,5 +474,30 @@ fn constants_are_quantized_as_running_values_are() {
         let is_denormal = rounded.abs() < 2.0_f32.powi(-14);
         let expected = if is_denormal { 0.0_f32.copysign(value) } else { rounded };
         assert_eq!(contents(&results), [expected.to_bits(); 2 * LANES], "{value}");
+    }
+}
+
+/// Zeros are ordered by their signs where a module says which operations may ignore these.
+#[gaurast_runner::test]
+fn zeros_have_signs() {
+    let values = [0.0, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, 2.5, -2.5];
+    let pairs: Vec<(f32, f32)> = (0..LANES).map(|lane| (values[lane / 8], values[lane % 8])).collect();
+    let first = floats(&pairs.iter().map(|pair| pair.0).collect::<Vec<_>>());
+    let second = floats(&pairs.iter().map(|pair| pair.1).collect::<Vec<_>>());
+    let module = Module::parse(&with(&words_of("signed_zeros.comp"), spirv::Capability::FloatControls2)).unwrap();
+    let (stage, specialization) = (gaurast_spirv::Stage::Compute, Specialization::default());
+    let shader = gaurast_spirv::translate(&module, "main", stage, &specialization, &crate::common::OPTIONS).unwrap();
+    let results = buffer(&[0xdead_beef; 3 * LANES]);
+    let buffers = [((0, 0, 0), &first), ((0, 1, 0), &second), ((0, 2, 0), &results)];
+    Dispatch { buffers: &buffers, ..Dispatch::new(&shader, [1, 1, 1]) }.run().unwrap();
+    let results = contents(&results);
+    for (lane, (a, b)) in pairs.into_iter().enumerate() {
+        let is_first_less = a.total_cmp(&b).is_lt();
+        let fraction = if a.is_infinite() { 0.0_f32 } else { a.fract() }.copysign(a);
+        let expected = if is_first_less { [a, b, fraction] } else { [b, a, fraction] };
+        for (row, expected) in expected.into_iter().enumerate() {
+            let found = f32::from_bits(results[LANES * row + lane]);
+            assert_eq!(found.to_bits(), expected.to_bits(), "row {row} of {a} and {b}: {found}, not {expected}");
+        }
     }
 }

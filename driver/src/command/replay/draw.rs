@@ -227,7 +227,7 @@ fn draw_state(state: &mut State, primitives: &PrimitivePipeline) -> Result<Arc<D
         if options::is_strict().unwrap_or(false) {
             return Err(DrawError::Dynamic(unset));
         }
-        state.unset = Some(unset);
+        state.unset_dynamic = Some(unset);
     }
     if !fixed.draw.rasterizer_discard {
         if let Some(count) = dynamic_count(primitives.viewports, state.viewport_count) {

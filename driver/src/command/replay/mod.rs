@@ -231,12 +231,14 @@ fn draw(
     if parameters.count == 0 || parameters.instance_count == 0 {
         return Ok(());
     }
-    match packets(state, parameters, draw_index) {
+    let packets = packets(state, parameters, draw_index);
+    let unset = state.unset_dynamic.take();
+    match packets {
         Ok(packets) => {
             if let Some(sentence) = gaussian::beyond_buffers(&packets) {
                 execution.report(&sentence);
             }
-            if let Some(unset) = state.unset.take() {
+            if let Some(unset) = unset {
                 execution.report(&format!(
                     "the pipeline's {unset:?} is dynamic and was not set: the draw takes its default"
                 ));

@@ -47,8 +47,8 @@ pub(crate) struct State {
     pub(crate) dynamic_states: DynamicStates,
     /// The fixed-function state of the last draw, unless something in it has changed since.
     pub(crate) draw_state: Option<Arc<DrawState>>,
-    /// A dynamic state that the pipeline has and that was not set for a draw.
-    pub(crate) unset: Option<vk::DynamicState>,
+    /// A dynamic state of the pipeline that was not set for the current draw.
+    pub(crate) unset_dynamic: Option<vk::DynamicState>,
     /// The cameras of Gaussian draws, one for all views or one for each, if they were set. Binding another pipeline
     /// keeps them.
     pub(crate) cameras: Box<[Camera]>,

@@ -25,7 +25,7 @@ pub fn fold(program: &mut Program, table: Option<&[u32]>) {
 pub struct Constants {
     known: HashMap<Reg, u64>,
     registers: HashMap<(Type, u64), Reg>,
-    /// Those that were added.
+    /// The constants that passes have added.
     pub new: Vec<Constant>,
 }
 
